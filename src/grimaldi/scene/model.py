@@ -1,0 +1,90 @@
+"""The checked scene: plain frozen data in Float64, all that the later stages read."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from grimaldi.scene.planar import PlanarOutline
+
+Vector = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Source:
+    """One monochromatic source, a point (eq. 1) or a plane wave (eq. 2).
+
+    Exactly one of `position` and `direction` is set. `tint` (channels,) is the power of each colour
+    channel of the light relative to their mean, so that channel c has the amplitude
+    `amplitude * sqrt(tint[c])`.
+    """
+
+    name: str
+    group: str
+    amplitude: float  # A [√irradiance · length for a point, √irradiance for a plane wave]
+    phase: float  # φ0 [rad]
+    position: Vector | None = None  # S (3,)
+    direction: Vector | None = None  # d (3,), unit
+    origin: Vector = field(default_factory=lambda: np.zeros(3))  # O (3,) of eq. 2
+    tint: tuple[float, ...] = (1.0, 1.0, 1.0)
+
+    @property
+    def is_plane(self) -> bool:
+        return self.direction is not None
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """Triangles: vertices (n, 3) in world space, faces (m, 3) indices. Not welded."""
+
+    vertices: Vector
+    faces: NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class Sphere:
+    centre: Vector
+    radius: float
+
+
+@dataclass(frozen=True, eq=False)
+class Disk:
+    """The disc |x|² + |y|² <= 1, z = 0 under the affine map `to_world` (4, 4): in general an ellipse."""
+
+    to_world: Vector
+
+
+Geometry = Mesh | Sphere | Disk
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """An opaque shape that casts outlines. `shape` is its index in `mi.Scene.shapes()`."""
+
+    name: str
+    shape: int
+    geometry: Geometry
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """A checked scene.
+
+    `mitsuba` is the whole scene as the camera sees it; `blockers` holds only the opaque bodies
+    (apertures, null and mask surfaces left out) and is what visibility rays are traced in, None where
+    there is no body. `holes` are the openings of one infinite opaque screen, `masks` opaque planar
+    outlines without a shape of their own.
+    """
+
+    name: str
+    mitsuba: Any
+    blockers: Any
+    bodies: tuple[Body, ...]
+    sources: tuple[Source, ...]
+    holes: tuple[PlanarOutline, ...] = ()
+    masks: tuple[PlanarOutline, ...] = ()
+    unit: str | None = None  # length of one scene unit, as text for pint: "1 um"
