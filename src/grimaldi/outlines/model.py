@@ -1,0 +1,33 @@
+"""What a source sees of the edges that bound its light: plain frozen data."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Reals = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class Outline:
+    """The lit outlines of one source as straight segments, n of them, in world space.
+
+    Each runs from `start` to `end` so that dφ > 0 (THEORY eq. 4-6) seen from a ray that hits the body,
+    or goes through the hole. Neighbours share their end points exactly; where a near outline crosses
+    in front of a far one the loop closes through a radial connector, which carries no dφ and is left out.
+    """
+
+    start: Reals  # (n, 3)
+    end: Reals  # (n, 3)
+    body: Integers  # (n,) index into Scene.bodies; -1 - i for planar outline i
+    edge: Integers  # (n,) the mesh edge it lies on, -1 on smooth shapes
+    interval: Reals  # (n, 2) the lit part of that edge, as parameters in 0..1
+    normals: Reals  # (n, 2, 3) unit normals of the two faces beside, towards the source first; 0 where there is none
+    outward: Reals  # (n, 3) unit, across the ray from the source, towards the open side
+    chain: Integers  # (n,) segments of one chain follow each other in the arrays, end to start
+
+    def __len__(self) -> int:
+        return len(self.start)
