@@ -19,8 +19,7 @@ def replacing(path: str | Path) -> Iterator[Path]:
     is missing or cannot be written to.
     """
     path = Path(path)
-    if not path.parent.is_dir():
-        raise InputError(f"{path}: the folder {path.parent} does not exist; make it first")
+    check_writable(path)
     if path.is_dir():
         raise InputError(f"{path}: is a folder; name a file in it")
     try:
@@ -35,6 +34,31 @@ def replacing(path: str | Path) -> Iterator[Path]:
         temporary.replace(path)
     finally:
         temporary.unlink(missing_ok=True)
+
+
+@contextmanager
+def replacing_folder(path: str | Path) -> Iterator[Path]:
+    """Like `replacing`, for output that is a folder: a new one that takes the place of an older one."""
+    path = Path(path)
+    check_writable(path)
+    if path.exists() and not path.is_dir():
+        raise InputError(f"{path}: is a file; remove it, or choose another name")
+    with tempfile.TemporaryDirectory(dir=path.parent, prefix=f".{path.stem}-") as scratch:
+        new, old = Path(scratch, "new"), Path(scratch, "old")
+        new.mkdir()
+        yield new
+        if path.exists():
+            path.rename(old)
+        new.rename(path)
+
+
+def check_writable(path: str | Path) -> None:
+    """Raise InputError where the folder of `path` is missing or cannot be written to."""
+    folder = Path(path).parent
+    if not folder.is_dir():
+        raise InputError(f"{path}: the folder {folder} does not exist; make it first")
+    if not os.access(folder, os.W_OK | os.X_OK):
+        raise InputError(f"{path}: the folder {folder} is not writable; choose another")
 
 
 def _umask() -> int:

@@ -1,0 +1,74 @@
+"""Arguments and options that several commands share, and how they reach the library."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import typer
+
+from grimaldi.errors import InputError
+
+Scene = Annotated[
+    str,
+    typer.Argument(
+        help="A Mitsuba scene file (.xml), or a built-in scene: young, slit, arago, knife-edge, creature.",
+        show_default=False,
+    ),
+]
+Wavelength = Annotated[
+    str | None,
+    typer.Option(help="In scene units (0.4), or with a unit ('532 nm', '450 nm, 550 nm').", metavar="LENGTH"),
+]
+SceneUnit = Annotated[
+    str | None,
+    typer.Option(help="Length of one scene unit ('1 um'); for wavelengths with a unit.", metavar="LENGTH"),
+]
+Diffraction = Annotated[
+    Literal["none", "boundary", "huygens", "area"] | None,
+    typer.Option(help="The model of diffraction.  [default: boundary]"),
+]
+Interference = Annotated[
+    bool | None,
+    typer.Option("--interference/--no-interference", help="Whether sources of one group add as fields."),
+]
+Tolerance = Annotated[
+    float | None, typer.Option(help="Largest error of M for each source and point.  [default: 1e-3]")
+]
+Precision = Annotated[Literal["auto", "double"] | None, typer.Option(help="Of the edge integrals.")]
+Variant = Annotated[
+    str | None, typer.Option(help="Mitsuba's variant, such as llvm_ad_rgb.  [default: the best that works]")
+]
+
+
+def given(**options: Any) -> dict[str, Any]:
+    """The options that were given: the library's own defaults serve for the rest."""
+    return {name: value for name, value in options.items() if value is not None}
+
+
+def check_output(path: Path, suffixes: tuple[str, ...]) -> None:
+    """Raise InputError where `path` could not be written, before anything is computed."""
+    from grimaldi.files import check_writable
+
+    if path.suffix.lower() not in suffixes:
+        raise InputError(
+            f"{path}: unknown kind of file {path.suffix!r}; end the name in {', '.join(suffixes)}"
+        )
+    check_writable(path)
+
+
+def set_variant(name: str | None) -> None:
+    """Set Mitsuba's variant to `name`, if one is named."""
+    if name is None:
+        return
+    import mitsuba as mi
+
+    from grimaldi.conventions import check_options
+    from grimaldi.variants import ensure_variant
+
+    check_options([name], mi.variants())
+    try:
+        mi.set_variant(name)
+    except ImportError as error:
+        raise InputError(f"--variant: {name} does not work here ({error}); run 'grimaldi doctor'") from None
+    ensure_variant("rgb")

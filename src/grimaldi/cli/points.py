@@ -1,0 +1,63 @@
+"""The points of `grimaldi field`, from a file or as a grid on a plane."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from grimaldi.errors import InputError
+
+Points = NDArray[np.float64]
+
+
+def read_points(path: Path) -> Points:
+    """Points (n, 3) from a .npy file, or from a .csv file with x, y, z in rows ('#' begins a comment)."""
+    try:
+        match path.suffix.lower():
+            case ".npy":
+                values = np.load(path, allow_pickle=False)
+            case ".csv":
+                values = np.loadtxt(path, delimiter=",", ndmin=2)
+            case suffix:
+                raise InputError(f"{path}: unknown kind of file {suffix!r}; give points as .npy or .csv")
+        points = np.asarray(values, dtype=np.float64)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror or error}); check the name") from None
+    except (ValueError, TypeError, EOFError) as error:
+        raise InputError(f"{path}: not a table of numbers ({error}); give x, y, z in rows") from None
+    if points.ndim != 2 or points.shape[1] != 3 or len(points) == 0:
+        raise InputError(f"{path}: has the shape {points.shape}; give n rows of x, y, z")
+    bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
+    if len(bad):
+        raise InputError(f"{path}: row {bad[0] + 1} is not finite; remove or mend it")
+    return points
+
+
+def parse_plane(text: str) -> tuple[Points, dict[str, Any]]:
+    """The grid "corner; end of the first side; end of the second side; NxM" and its attributes.
+
+    Returns points (N·M, 3), the first side running fastest, and {"grid": [M, N]}, the shape into which
+    the results along `point` can be folded.
+    """
+    parts = text.split(";")
+    try:
+        corner, first, second = (np.array([float(x) for x in part.split(",")]) for part in parts[:3])
+        columns, rows = (int(count) for count in parts[3].lower().split("x"))
+        frame = np.stack([corner, first - corner, second - corner])
+        good = (
+            frame.shape == (3, 3) and np.isfinite(frame).all() and min(columns, rows) > 0 and len(parts) == 4
+        )
+    except (ValueError, IndexError):
+        good = False
+    if not good:
+        raise InputError(
+            f"--plane: cannot read {text!r}; write 'x,y,z; x,y,z; x,y,z; NxM': "
+            "a corner, the ends of the two sides that start there, and the points along each"
+        )
+    u = np.linspace(0.0, 1.0, columns)[None, :, None]
+    v = np.linspace(0.0, 1.0, rows)[:, None, None]
+    points = frame[0] + u * frame[1] + v * frame[2]
+    return points.reshape(-1, 3), {"grid": [rows, columns]}
