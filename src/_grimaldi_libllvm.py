@@ -23,7 +23,10 @@ def find() -> str | None:
     installed = os.path.abspath(__file__)
     for _ in range(3):
         installed = os.path.dirname(installed)
-    for folder in {os.path.join(sys.prefix, "lib"), installed}:
+    folders = {os.path.join(sys.prefix, "lib")}
+    if os.path.basename(installed) == "lib":
+        folders.add(installed)
+    for folder in folders:
         try:
             names = os.listdir(folder)
         except OSError:

@@ -78,7 +78,7 @@ def _one(item: Any, scale: tuple[float, str] | None) -> float:
     if unit is not None:
         if scale is None:
             raise InputError(
-                f"wavelength: {item.strip()!r} needs the length of a scene unit; give scene_unit, such as '1 um'"
+                f"wavelength: {item.strip()!r} needs the length of a scene unit; give scene_unit, as '1 um'"
             )
         value = _convert("wavelength", value, unit, scale[1]) / scale[0]
     if not (math.isfinite(value) and value > 0):

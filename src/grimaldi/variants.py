@@ -38,7 +38,7 @@ def best_variant(kind: Literal["rgb", "mono"]) -> str:
 
 
 def libllvm_problem() -> str | None:
-    """What is wrong with the libLLVM that Dr.Jit has loaded, with its remedy, on one line; None if nothing."""
+    """What is wrong with the libLLVM that Dr.Jit has loaded, with its remedy, on one line, or None."""
     import drjit as dr
 
     version = dr.detail.llvm_version()

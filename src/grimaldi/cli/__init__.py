@@ -24,7 +24,7 @@ def _run() -> int:
         from grimaldi.cli.app import app
 
         try:
-            return app(prog_name="grimaldi", standalone_mode=False) or 0
+            return app(sys.argv[1:] or ["--help"], prog_name="grimaldi", standalone_mode=False) or 0
         except InputError as error:
             return _fail(error, 2)
         except typer.TyperException as error:

@@ -29,7 +29,6 @@ def _callback(
 
 app = typer.Typer(
     callback=_callback,
-    no_args_is_help=True,
     add_completion=False,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,

@@ -13,7 +13,7 @@ import typer
 
 
 def doctor() -> None:
-    """Say what Grimaldi finds on this machine, and mend-it commands for what is wrong."""
+    """Say what is installed, what is wrong, and what mends it."""
     problems = list(_wrong_packages())
     _line("grimaldi", metadata.version("grimaldi"))
     _line("python", f"{platform.python_version()} ({sys.executable})")
@@ -63,7 +63,7 @@ def _back_ends() -> list[str]:
     gpu = dr.has_backend(dr.JitBackend.CUDA)
     wrong = libllvm_problem()
     version = ".".join(map(str, dr.detail.llvm_version()))
-    _line("mitsuba", f"{mi.__version__}, drjit {dr.__version__}")
+    _line("mitsuba", f"{mi.__version__}, drjit {metadata.version('drjit')}")
     _line("libLLVM", "none that works" if wrong else f"{version} ({_loaded_libllvm()})")
     _line("GPU", f"CUDA {'.'.join(map(str, dr.detail.cuda_version()))}" if gpu else "none answers")
     if gpu or not wrong:

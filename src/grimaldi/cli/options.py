@@ -69,6 +69,6 @@ def set_variant(name: str | None) -> None:
     check_options([name], mi.variants())
     try:
         mi.set_variant(name)
-    except ImportError as error:
-        raise InputError(f"--variant: {name} does not work here ({error}); run 'grimaldi doctor'") from None
+    except ImportError:
+        raise InputError(f"--variant: {name} does not work here; run 'grimaldi doctor' to see why") from None
     ensure_variant("rgb")

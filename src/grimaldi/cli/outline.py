@@ -24,7 +24,7 @@ def outline(
     ] = None,
     variant: options.Variant = None,
 ) -> None:
-    """Write the outlines and the shadow mask of SCENE as one of its sources sees them."""
+    """Write the outlines and the shadow mask that a source sees."""
     options.check_output(output, (".svg", ".png", ".ply"))
     options.set_variant(variant)
 

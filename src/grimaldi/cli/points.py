@@ -42,22 +42,19 @@ def parse_plane(text: str) -> tuple[Points, dict[str, Any]]:
     Returns points (N·M, 3), the first side running fastest, and {"grid": [M, N]}, the shape into which
     the results along `point` can be folded.
     """
-    parts = text.split(";")
     try:
-        corner, first, second = (np.array([float(x) for x in part.split(",")]) for part in parts[:3])
-        columns, rows = (int(count) for count in parts[3].lower().split("x"))
-        frame = np.stack([corner, first - corner, second - corner])
-        good = (
-            frame.shape == (3, 3) and np.isfinite(frame).all() and min(columns, rows) > 0 and len(parts) == 4
-        )
-    except (ValueError, IndexError):
-        good = False
-    if not good:
+        *vertices, counts = text.split(";")
+        corner, first, second = np.array([[float(x) for x in vertex.split(",")] for vertex in vertices])
+        sides = np.stack([first - corner, second - corner])
+        columns, rows = (int(count) for count in counts.lower().split("x"))
+        if sides.shape != (2, 3) or not np.isfinite(sides).all() or min(columns, rows) < 1:
+            raise ValueError
+    except ValueError:
         raise InputError(
             f"--plane: cannot read {text!r}; write 'x,y,z; x,y,z; x,y,z; NxM': "
             "a corner, the ends of the two sides that start there, and the points along each"
-        )
+        ) from None
     u = np.linspace(0.0, 1.0, columns)[None, :, None]
     v = np.linspace(0.0, 1.0, rows)[:, None, None]
-    points = frame[0] + u * frame[1] + v * frame[2]
+    points = corner + u * sides[0] + v * sides[1]
     return points.reshape(-1, 3), {"grid": [rows, columns]}

@@ -1,0 +1,5 @@
+"""`python -m grimaldi` is the command `grimaldi`."""
+
+from grimaldi.cli import main
+
+main()
