@@ -22,7 +22,7 @@ help:
 	@echo "make render        the creature with diffraction and by rays, into out/"
 	@echo "make test          ruff, pyright and pytest"
 	@echo "make test-browser  the tests that need a browser (none yet)"
-	@echo "make lock          renew requirements.lock from pyproject.toml"
+	@echo "make lock          requirements.lock from pyproject.toml (LOCK_FLAGS=--upgrade for newer versions)"
 	@echo "make clean         remove .venv, out and caches"
 
 install: $(INSTALLED)
@@ -48,8 +48,7 @@ lock: $(BIN)/uv
 
 render: install
 	@mkdir -p out
-	$(BIN)/grimaldi render creature -o out/creature.exr
-	$(BIN)/grimaldi render creature -o out/creature.png
+	$(BIN)/grimaldi render creature -o out/creature.exr -o out/creature.png
 	$(BIN)/grimaldi render creature --diffraction none -o out/creature-rays.png
 
 test: install
