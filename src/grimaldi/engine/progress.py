@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import sys
-import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from time import monotonic
 
 
 @contextmanager
@@ -30,14 +30,15 @@ def progress(total: int, label: str) -> Iterator[Callable[[int], None]]:
         transient=True,
     )
     task = bar.add_task(label, total=total)
-    begun = time.monotonic()
+    begun = monotonic()
 
     def advance(steps: int) -> None:
         bar.advance(task, steps)
-        if not bar.live.is_started and time.monotonic() - begun > 1:
+        if not bar.live.is_started and monotonic() - begun > 1:
             bar.start()
 
     try:
         yield advance
     finally:
-        bar.stop()
+        if bar.live.is_started:
+            bar.stop()

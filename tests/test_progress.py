@@ -1,0 +1,51 @@
+"""The progress bar: on a terminal, for long jobs, and nowhere else."""
+
+from __future__ import annotations
+
+import io
+import sys
+
+import pytest
+
+from grimaldi.engine import progress as module
+from grimaldi.engine.progress import progress
+
+
+class Terminal(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+@pytest.fixture
+def clock(monkeypatch: pytest.MonkeyPatch) -> list[float]:
+    now = [0.0]
+    monkeypatch.setattr(module, "monotonic", lambda: now[0])
+    return now
+
+
+def written(monkeypatch: pytest.MonkeyPatch, stderr: io.StringIO, clock: list[float], seconds: float) -> str:
+    """What a job of ten steps that takes `seconds` writes to `stderr`."""
+    monkeypatch.setattr(sys, "stderr", stderr)
+    monkeypatch.setenv("TERM", "xterm")
+    with progress(10, "render") as advance, progress(2, "inner") as advance_inner:
+        for step in range(10):
+            clock[0] = (step + 1) * seconds / 10
+            advance(1)
+            advance_inner(0)
+    return stderr.getvalue()
+
+
+def test_a_long_job_on_a_terminal_shows_its_bar(monkeypatch: pytest.MonkeyPatch, clock: list[float]) -> None:
+    shown = written(monkeypatch, Terminal(), clock, 20.0)
+    assert "render" in shown
+    assert "%" in shown
+
+
+def test_a_short_job_shows_nothing(monkeypatch: pytest.MonkeyPatch, clock: list[float]) -> None:
+    assert written(monkeypatch, Terminal(), clock, 0.9) == ""
+
+
+def test_nothing_is_shown_where_there_is_no_terminal(
+    monkeypatch: pytest.MonkeyPatch, clock: list[float]
+) -> None:
+    assert written(monkeypatch, io.StringIO(), clock, 20.0) == ""
