@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from grimaldi.plugins import parameters
 
 
@@ -92,8 +94,7 @@ def register(V: Any) -> None:
             return V.Spectrum(0.0)
 
         def bbox(self) -> Any:
-            corner = [float(dr.slice(x, 0)) for x in self.position]
-            return V.ScalarBoundingBox3f(V.ScalarPoint3f(corner))
+            return V.ScalarBoundingBox3f(V.ScalarPoint3f(np.array(self.position).reshape(3)))
 
         def to_string(self) -> str:
             return (

@@ -80,7 +80,7 @@ class PlanarOutline:
 def _affine(matrix: Any, place: str) -> Reals:
     """A (4, 4) affine matrix whose x and y axes span a plane."""
     try:
-        matrix = np.array(matrix, dtype=np.float64)
+        matrix = np.array(matrix, dtype=np.float64).squeeze()  # Dr.Jit matrices have a trailing axis
     except (TypeError, ValueError):
         matrix = np.empty(0)
     if matrix.shape != (4, 4) or not np.isfinite(matrix).all() or (matrix[3] != (0, 0, 0, 1)).any():
@@ -101,12 +101,12 @@ def _oriented(loops: list[Reals], place: str) -> tuple[Reals, ...]:
     if not loops:
         raise InputError(f"{place}: has no loops; give at least one with three corners")
     loops = [_checked(loop, f"{place}: loop {i + 1}") for i, loop in enumerate(loops)]
-    rings = np.array([shapely.LinearRing(loop) for loop in loops])
+    rings = [shapely.LinearRing(loop) for loop in loops]
     first, second = shapely.STRtree(rings).query(rings, predicate="intersects")
     if (meeting := first < second).any():
         i, j = first[meeting][0] + 1, second[meeting][0] + 1
         raise InputError(f"{place}: loops {i} and {j} cross or touch; unite them into one")
-    polygons = shapely.polygons(rings)
+    polygons = [shapely.Polygon(ring) for ring in rings]
     inner, _ = shapely.STRtree(polygons).query(rings, predicate="within")
     depth = np.bincount(inner, minlength=len(rings))  # a ring is on its own polygon's border, not within it
     result = []
@@ -174,7 +174,7 @@ def _read_csv(text: str, path: Path) -> list[Reals]:
 def _split(loops: Any, place: str) -> list[Reals]:
     """One (n, 2) array, with NaN rows between loops or not, or several."""
     try:
-        arrays = [np.asarray(loops, dtype=np.float64)]
+        arrays: list[Reals] = [np.asarray(loops, dtype=np.float64)]
     except (TypeError, ValueError):  # loops of different lengths
         try:
             arrays = [np.asarray(loop, dtype=np.float64) for loop in loops]
@@ -190,7 +190,6 @@ def _split(loops: Any, place: str) -> list[Reals]:
 
 def _split_at_nan(rows: Reals) -> list[Reals]:
     """The runs between rows that are NaN in both columns."""
-    gap = np.isnan(rows).all(axis=1)
-    starts = np.flatnonzero(~gap & np.r_[True, gap[:-1]]) if len(rows) else np.empty(0, int)
-    ends = np.flatnonzero(~gap & np.r_[gap[1:], True]) + 1 if len(rows) else np.empty(0, int)
-    return [rows[start:end].copy() for start, end in zip(starts, ends, strict=True)]
+    gaps = np.flatnonzero(np.isnan(rows).all(axis=1))
+    runs = np.split(rows, np.sort(np.r_[gaps, gaps + 1]))
+    return [run for run in runs if not np.isnan(run).all()]

@@ -1,0 +1,146 @@
+"""Refuses scenes that Mitsuba would crash on or render wrongly, and those that waves make no sense in."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from grimaldi.errors import GrimaldiWarning, InputError
+from grimaldi.scene.bodies import faces_inward
+from grimaldi.scene.messages import where
+from grimaldi.scene.model import Body, Mesh, Scene, Sphere
+from grimaldi.scene.ply import check_ply, check_positions
+from grimaldi.scene.screen import check_screen
+
+Reals = NDArray[np.float64]
+
+
+def require_sources(scene: Scene) -> None:
+    """Raises InputError where a field is asked of a scene without a source."""
+    if not scene.sources:
+        raise InputError(
+            f"{scene.name}: has no source of waves; add a 'point', 'directional', 'coherent_point' or "
+            "'coherent_directional' emitter"
+        )
+
+
+def require_sensor(scene: Scene) -> None:
+    """Raises InputError where a picture is asked of a scene without a camera."""
+    if not scene.mitsuba.sensors():
+        raise InputError(f'{scene.name}: has no sensor; add one, such as <sensor type="perspective">')
+
+
+def check_nodes(state: Any) -> None:
+    """Checks a parsed scene (`mi.parser.ParserState`) before Mitsuba builds it: PLY files, spheres' radii.
+
+    Raises:
+        InputError: naming the file and line.
+    """
+    import mitsuba as mi
+
+    resolver = cast(Any, mi).file_resolver()  # misplaced in the stubs
+    for node in state.nodes:
+        plugin, props = node.props.plugin_name(), node.props
+        place = where(mi.parser.file_location(state, node))
+        if plugin == "ply" and isinstance(name := props.get("filename", None), str):
+            file = Path(str(resolver.resolve(name)))
+            if not file.is_file():
+                raise InputError(f"{place}: file {name!r} not found; name it relative to the scene's folder")
+            check_ply(file)
+        elif plugin == "sphere" and isinstance(radius := props.get("radius", None), (int, float)):
+            _check_radius(radius, place)
+
+
+def check_scene(scene: Scene) -> None:
+    """Checks bodies, sources and screen of a loaded scene.
+
+    Raises:
+        InputError: naming the body or source.
+        NotYet: bodies and apertures that cannot be computed together yet.
+
+    Warns:
+        GrimaldiWarning: naming each body's edge that is shared by more than two faces.
+    """
+    for body in scene.bodies:
+        _check_body(body)
+    for source in scene.sources:
+        for body in scene.bodies:
+            if source.position is not None and _is_inside(source.position, body, scene.mitsuba):
+                raise InputError(
+                    f"{source.name}: the source lies inside {body.name!r}; move it out, or turn the faces "
+                    "inward (flip_normals) if that is a room"
+                )
+    check_screen(scene)
+
+
+def _check_body(body: Body) -> None:
+    geometry = body.geometry
+    if isinstance(geometry, Sphere):
+        _check_radius(geometry.radius, body.name)
+        check_positions(geometry.centre[None], body.name)
+    elif isinstance(geometry, Mesh):
+        if not len(geometry.faces):
+            raise InputError(f"{body.name}: the mesh is empty; give it at least one triangle")
+        check_positions(geometry.vertices, body.name)
+        _warn_of_shared_edges(geometry, body.name)
+    elif not (np.abs(geometry.to_world) < 1e30).all():
+        raise InputError(f"{body.name}: to_world is not finite; give finite numbers below 1e30")
+
+
+def _check_radius(radius: float, place: str) -> None:
+    if not (math.isfinite(radius) and radius > 0):
+        raise InputError(f"{place}: the sphere's radius is {radius:g}; give a positive number")
+
+
+def _warn_of_shared_edges(mesh: Mesh, name: str) -> None:
+    """Names the first edge that more than two faces meet at."""
+    _, vertex = np.unique(mesh.vertices + 0.0, axis=0, return_inverse=True)  # + 0.0: -0 is 0
+    corners = vertex.reshape(-1)[mesh.faces]
+    edges = np.sort(np.concatenate([corners[:, [0, 1]], corners[:, [1, 2]], corners[:, [2, 0]]]), axis=1)
+    key = edges[:, 0] * len(vertex) + edges[:, 1]
+    _, first, count = np.unique(key[edges[:, 0] != edges[:, 1]], return_index=True, return_counts=True)
+    shared = np.flatnonzero(count > 2)
+    if len(shared):
+        sides = np.concatenate([mesh.faces[:, [0, 1]], mesh.faces[:, [1, 2]], mesh.faces[:, [2, 0]]])
+        ends = mesh.vertices[sides[edges[:, 0] != edges[:, 1]][first[shared[0]]]]
+        start, end = (f"({', '.join(f'{x:g}' for x in point)})" for point in ends)
+        more = f", as are {len(shared) - 1} more edges" if len(shared) > 1 else ""
+        warnings.warn(
+            f"{name}: the edge from {start} to {end} is shared by {count[shared[0]]} faces{more}; "
+            "its outline may be wrong there",
+            GrimaldiWarning,
+            stacklevel=5,
+        )
+
+
+def _is_inside(point: Reals, body: Body, mi_scene: Any) -> bool:
+    """Whether the body's outward faces enclose the point; faces turned inward make a room, which may."""
+    geometry = body.geometry
+    if isinstance(geometry, Sphere):
+        inside = float(np.linalg.norm(point - geometry.centre)) < geometry.radius
+        return inside and not faces_inward(mi_scene, body)
+    if not isinstance(geometry, Mesh):
+        return False
+    low, high = geometry.vertices.min(axis=0), geometry.vertices.max(axis=0)
+    if not ((low < point) & (point < high)).all():
+        return False
+    winding = _winding_number(point, geometry)
+    # 1 in a closed mesh, less where one is open; a room with a missing wall stays well below 0.9.
+    return (-winding if faces_inward(mi_scene, body) else winding) > 0.9
+
+
+def _winding_number(point: Reals, mesh: Mesh) -> float:
+    """Solid angle of the faces over 4π (van Oosterom & Strackee 1983, eq. 8)."""
+    a, b, c = np.moveaxis((mesh.vertices - point)[mesh.faces], 1, 0)
+    la, lb, lc = (np.linalg.norm(x, axis=1) for x in (a, b, c))
+
+    def dot(x: Reals, y: Reals) -> Reals:
+        return np.einsum("ij,ij->i", x, y)
+
+    half = np.arctan2(dot(a, np.cross(b, c)), la * lb * lc + dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb)
+    return float(half.sum() / (2 * np.pi))

@@ -1,0 +1,192 @@
+"""Whatever names a scene, as a checked `Scene`."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import replace
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any
+
+from grimaldi.errors import GrimaldiWarning, InputError
+from grimaldi.scene.bodies import blockers, sort_shapes
+from grimaldi.scene.checking import check_nodes, check_scene
+from grimaldi.scene.messages import one_line
+from grimaldi.scene.model import Scene
+from grimaldi.scene.planar import PlanarOutline
+from grimaldi.scene.sources import sources
+from grimaldi.scene.xml import DEEPEST, check_xml
+
+
+def load(scene: Any, *, outlines: Iterable[PlanarOutline] = (), scene_unit: str | None = None) -> Scene:
+    """A checked scene: its opaque bodies, holes and sources in Float64, and the Mitsuba scene itself.
+
+    Args:
+        scene: path of a Mitsuba XML file; a Mitsuba scene dictionary; a `mi.Scene`; the name of a
+            built-in scene; or a `Scene`, which is returned as it is unless outlines or a unit are given.
+        outlines: planar outlines to add, holes of the aperture screen or opaque masks.
+        scene_unit: length of one scene unit, such as "1 um". Otherwise that of the scene itself: in XML
+            `<string name="scene_unit" value="1 um"/>` directly in `<scene>`, in a dictionary the key
+            "scene_unit" beside "type".
+
+    Where no Mitsuba variant is set, the best mono one that works is.
+
+    Raises:
+        InputError: one line that names file and place, what is wrong there and the remedy.
+        NotYet: bodies and apertures that cannot be computed together yet.
+
+    Warns:
+        GrimaldiWarning: naming what does not diffract yet, and edges shared by more than two faces.
+    """
+    added = _outlines(outlines)
+    if isinstance(scene, Scene):
+        if not added and scene_unit is None:
+            return scene
+        loaded = scene
+    else:
+        loaded = _read(scene)
+    loaded = replace(
+        loaded,
+        holes=(*loaded.holes, *(outline for outline in added if outline.hole)),
+        masks=(*loaded.masks, *(outline for outline in added if not outline.hole)),
+        unit=loaded.unit if scene_unit is None else scene_unit,
+    )
+    check_scene(loaded)
+    return loaded
+
+
+def _outlines(outlines: Iterable[PlanarOutline]) -> tuple[PlanarOutline, ...]:
+    outlines = (outlines,) if isinstance(outlines, PlanarOutline) else tuple(outlines)
+    for outline in outlines:
+        if not isinstance(outline, PlanarOutline):
+            raise InputError(f"outlines: {type(outline).__name__} is no PlanarOutline; make one of it first")
+    return outlines
+
+
+def _read(scene: Any) -> Scene:
+    """The scene with its bodies, holes and sources, not yet checked."""
+    import mitsuba as mi
+
+    from grimaldi.variants import ensure_variant
+
+    ensure_variant("mono")
+    name, mi_scene, unit = _open(scene)
+    if not isinstance(mi_scene, mi.Scene):
+        raise InputError(
+            f"{name}: is a {type(mi_scene).__name__}, no scene of variant {mi.variant()}; give a scene"
+        )
+    shapes = sort_shapes(mi_scene.shapes())
+    if shapes.others:
+        warnings.warn(f"{', '.join(shapes.others)}: does not diffract yet", GrimaldiWarning, stacklevel=3)
+    return Scene(
+        name=name,
+        mitsuba=mi_scene,
+        blockers=blockers(mi_scene, shapes.bodies),
+        bodies=shapes.bodies,
+        sources=sources(mi_scene),
+        holes=shapes.holes,
+        unit=unit,
+    )
+
+
+def _open(scene: Any) -> tuple[str, Any, str | None]:
+    """Name, Mitsuba scene and unit."""
+    if isinstance(scene, Mapping):
+        return "scene", *_from_dict(dict(scene))
+    if not isinstance(scene, (str, Path)):
+        return "scene", scene, None
+    path = Path(scene)
+    if path.is_file():
+        return path.stem, *_from_file(path)
+    return str(scene), *_from_dict(_builtin(str(scene)))
+
+
+def _builtin(name: str) -> dict[str, Any]:
+    from grimaldi.scene import builtin
+
+    names = sorted(builtin.names())
+    if name in names:
+        return builtin.build(name)
+    if Path(name).is_dir():
+        raise InputError(f"{name}: is a folder; name the scene's XML file in it")
+    nearest = get_close_matches(name, names, n=1)
+    advice = f"did you mean {nearest[0]!r}?" if nearest else f"built-in scenes are {', '.join(names)}"
+    raise InputError(f"{name}: no such file or built-in scene; {advice}")
+
+
+def _from_file(path: Path) -> tuple[Any, str | None]:
+    import mitsuba as mi
+
+    check_xml(path)
+    config = _config()
+    with _searching(path.parent), _mitsuba_errors():
+        return _instantiate(config, mi.parser.parse_file(config, str(path)))
+
+
+def _from_dict(scene: dict[str, Any]) -> tuple[Any, str | None]:
+    import mitsuba as mi
+
+    _check_depth(scene)
+    config = _config()
+    with _mitsuba_errors():
+        return _instantiate(config, mi.parser.parse_dict(config, scene))
+
+
+def _config() -> Any:
+    """Without merging, which would make one nameless mesh of the two rectangles of a double slit."""
+    import mitsuba as mi
+
+    config = mi.parser.ParserConfig(str(mi.variant()))
+    config.merge_meshes = config.merge_equivalent = False
+    return config
+
+
+def _instantiate(config: Any, state: Any) -> tuple[Any, str | None]:
+    import mitsuba as mi
+
+    unit = state.root.props.get("scene_unit", None)
+    if unit is not None:
+        if not isinstance(unit, str):
+            raise InputError(f"scene_unit: {unit!r} has no unit; write it like '1 um'")
+        del state.root.props["scene_unit"]
+    mi.parser.transform_all(config, state)
+    check_nodes(state)
+    return mi.parser.instantiate(config, state), unit
+
+
+def _check_depth(scene: dict[str, Any]) -> None:
+    level: list[Any] = [scene]
+    for _ in range(DEEPEST):
+        level = [value for node in level for value in node.values() if isinstance(value, dict)]
+        if not level:
+            return
+    raise InputError(f"scene: dictionaries nested deeper than {DEEPEST}; flatten the scene")
+
+
+@contextmanager
+def _searching(folder: Path) -> Iterator[None]:
+    """Has Mitsuba look for files in `folder` first."""
+    import mitsuba
+
+    mi: Any = mitsuba  # the stubs misplace these functions
+    before = mi.file_resolver()
+    resolver = mi.FileResolver(before)
+    resolver.prepend(str(folder))
+    mi.set_file_resolver(resolver)
+    try:
+        yield
+    finally:
+        mi.set_file_resolver(before)
+
+
+@contextmanager
+def _mitsuba_errors() -> Iterator[None]:
+    """Mitsuba's errors as InputError."""
+    try:
+        yield
+    except InputError:
+        raise
+    except (RuntimeError, TypeError, ValueError) as error:
+        raise InputError(one_line(error)) from error

@@ -1,0 +1,78 @@
+"""Mitsuba's error messages, several lines with its own source's lines in them, as one line for the user."""
+
+from __future__ import annotations
+
+import re
+from difflib import get_close_matches
+from functools import cache
+from importlib import resources
+
+_SOURCE_LINE = re.compile(r"\[[\w.]+\.(?:cpp|h|inl):\d+\]\s*")
+_PLACE = re.compile(
+    r"(?:Error while loading|While loading|At) "
+    r'(?P<place>dictionary node "[^"]*"|[^\n]*? \(line \d+, col \d+\))(?:,|:) (?P<rest>.*)',
+    re.DOTALL,
+)
+_PARSING = re.compile(
+    r'(?:Parsing of|Error while loading) XML file "(?P<place>.*?)"(?: failed)?: (?P<rest>.*)', re.DOTALL
+)
+_UNKNOWN_PLUGIN = re.compile(r'Plugin "(?P<name>[^"]*)" not found')
+_UNREFERENCED = re.compile(r"Found \d+ unreferenced propert\w+ in (?P<plugin>.*?):\n(?P<list>.*)", re.DOTALL)
+_PROPERTY = re.compile(r'- \w+ "(?P<name>[^"]*)"')
+_MISSING_PROPERTY = re.compile(r'Property "(?P<name>[^"]*)" cannot be found')
+_MISSING_FILE = re.compile(
+    r'file "(?P<name>[^"]*)": file not found|included file "(?P<include>[^"]*)" not found'
+)
+_INSTANTIATE = re.compile(
+    r'failed to instantiate (?P<kind>\w+(?: plugin)?) (?:plugin )?of type "(?P<type>[^"]*)": '
+)
+_OWN_ERROR = re.compile(r"^(?:[\w.]*\.)?(?:InputError|NotYet): (?P<message>.*)\Z", re.MULTILINE | re.DOTALL)
+_NO_TRIANGLES = ("Storing new normals in a Mesh", "operands have incompatible sizes")
+
+
+def one_line(error: Exception) -> str:
+    """Where Mitsuba met the error, what is wrong there and what to do, without line breaks."""
+    text = _SOURCE_LINE.sub("", str(error)).strip()
+    place = ""
+    while (match := _PLACE.match(text) or _PARSING.match(text)) is not None:
+        place, text = match["place"], match["rest"].strip()
+    message = " ".join(_what(text).split())
+    return f"{where(place)}: {message}" if place else message
+
+
+def where(place: str) -> str:
+    """`FILE, line N` of a file; a dictionary's node as it is."""
+    return re.sub(r" \(line (\d+), col \d+\)", r", line \1", place)
+
+
+def _what(text: str) -> str:
+    """What is wrong, and what to do where the message tells enough for that."""
+    if own := _OWN_ERROR.search(text):
+        return own["message"]
+    of = f" of {kind['type']!r}" if (kind := _INSTANTIATE.match(text)) else ""
+    if match := _UNKNOWN_PLUGIN.search(text):
+        return f"unknown plugin {match['name']!r}; {_nearest(match['name'])}"
+    if match := _UNREFERENCED.search(text):
+        names = ", ".join(repr(name) for name in _PROPERTY.findall(match["list"]))
+        plugin = match["plugin"].rsplit('"', 2)[-2] if '"' in match["plugin"] else match["plugin"]
+        return f"unknown parameter {names} of {plugin!r}; check its spelling"
+    if match := _MISSING_PROPERTY.search(text):
+        return f"parameter {match['name']!r}{of} is missing; give it"
+    if match := _MISSING_FILE.search(text):
+        return f"file {match['name'] or match['include']!r} not found; name it relative to the scene's folder"
+    if any(sign in text for sign in _NO_TRIANGLES):
+        return f"the mesh{of} is empty; give it at least one triangle"
+    return _INSTANTIATE.sub(lambda match: f"{match['type']!r}: ", text)
+
+
+def _nearest(name: str) -> str:
+    nearest = get_close_matches(name, _plugin_names(), n=1)
+    return f"did you mean {nearest[0]!r}?" if nearest else "check its spelling"
+
+
+@cache
+def _plugin_names() -> tuple[str, ...]:
+    """Mitsuba's plugins, one shared library each, and Grimaldi's, one module each."""
+    folders = resources.files("mitsuba") / "plugins", resources.files("grimaldi.plugins")
+    names = {file.name.partition(".")[0] for folder in folders for file in folder.iterdir()}
+    return tuple(sorted(names - {"parameters", "__init__", "__pycache__"}))

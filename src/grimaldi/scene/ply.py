@@ -1,0 +1,165 @@
+"""Reads PLY files just far enough to refuse those that crash Mitsuba or that it reads wrongly."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from grimaldi.errors import InputError
+
+LARGEST = 1e30  # beyond it Float32 geometry overflows when squared
+
+_ANEW = "export the mesh anew"
+_TYPES = {
+    "char": "i1", "int8": "i1", "uchar": "u1", "uint8": "u1", "short": "i2", "int16": "i2",
+    "ushort": "u2", "uint16": "u2", "int": "i4", "int32": "i4", "uint": "u4", "uint32": "u4",
+    "float": "f4", "float32": "f4", "double": "f8", "float64": "f8",
+}  # fmt: skip
+
+
+@dataclass
+class _Element:
+    """One element of the header: `count` rows of properties (name, type, type of a list's length or None)."""
+
+    name: str
+    count: int
+    properties: list[tuple[str, str, str | None]] = field(default_factory=list)
+
+
+def check_ply(path: Path) -> None:
+    """Raises InputError unless `path` is a whole PLY file of triangles whose corners exist and are finite."""
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror}); check the name") from error
+    order, elements, at = _header(data, path)
+    tokens = [] if order else data[at:].split()
+    if not order:
+        at = 0
+    vertices: int | None = None
+    for element in elements:
+        dtype = _row(element, order or "=", path)
+        if order:
+            rows = _binary_rows(data, at, element.count, dtype)
+            at += rows.nbytes
+        else:
+            rows, at = _ascii_rows(tokens, at, element, dtype, path)
+        _check_whole(rows, element, path)
+        if element.name == "vertex":
+            vertices = element.count
+            _check_vertices(rows, path)
+        elif element.name == "face":
+            _check_faces(rows, vertices, path)
+
+
+def check_positions(positions: NDArray[np.floating], place: str) -> None:
+    """Raises InputError naming the first of the (n, 3) positions that is not finite, or beyond 1e30."""
+    # Negated, so that NaN counts as bad.
+    bad = ~(np.abs(positions) < LARGEST).all(axis=1)
+    if bad.any():
+        i = int(np.flatnonzero(bad)[0])
+        coordinates = ", ".join(f"{x:g}" for x in positions[i])
+        raise InputError(f"{place}: vertex {i} is at ({coordinates}); give finite coordinates below 1e30")
+
+
+def _header(data: bytes, path: Path) -> tuple[str, list[_Element], int]:
+    """Byte order ("<", ">", "" for ASCII), the elements, and where their rows start."""
+    end = data.find(b"end_header")
+    newline = data.find(b"\n", end)
+    if not data.startswith(b"ply") or end < 0 or newline < 0:
+        what = "is empty" if not data else "has no whole PLY header"
+        raise InputError(f"{path}: {what}; name a PLY file, or {_ANEW}")
+    order: str | None = None
+    elements: list[_Element] = []
+    for number, line in enumerate(data[:end].decode("ascii", "replace").splitlines(), start=1):
+        try:
+            match line.split():
+                case ["format", name, _]:
+                    order = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}[name]
+                case ["element", name, count]:
+                    elements.append(_Element(name, int(count)))
+                case ["property", "list", length, kind, name]:
+                    elements[-1].properties.append((name, _TYPES[kind], _TYPES[length]))
+                case ["property", kind, name]:
+                    elements[-1].properties.append((name, _TYPES[kind], None))
+        except (KeyError, ValueError, IndexError):
+            raise InputError(
+                f"{path}, line {number}: {line.strip()!r} is no PLY header line; {_ANEW}"
+            ) from None
+    if order is None:
+        raise InputError(f"{path}: the PLY header names no format; {_ANEW}")
+    counts = {element.name: element.count for element in elements}
+    if counts.get("vertex", 0) <= 0 or counts.get("face", 0) <= 0:
+        raise InputError(f"{path}: the mesh is empty; give it at least one triangle")
+    return order, elements, newline + 1
+
+
+def _row(element: _Element, order: str, path: Path) -> np.dtype[np.void]:
+    """One row's layout, with lists taken for triangles' corners: another length shows in the data."""
+    fields: list[tuple[str, str] | tuple[str, str, tuple[int]]] = []
+    for name, kind, length in element.properties:
+        if length is None:
+            fields.append((name, order + kind))
+        elif element.name == "face" and name in ("vertex_indices", "vertex_index"):
+            fields += [("corners", order + length), ("vertices", order + kind, (3,))]
+        else:
+            raise InputError(
+                f"{path}: {element.name} has a list {name!r}, which Mitsuba cannot read; {_ANEW}"
+            )
+    if not fields:
+        raise InputError(f"{path}: {element.name} has no properties; {_ANEW}")
+    return np.dtype(fields)
+
+
+def _binary_rows(data: bytes, at: int, count: int, dtype: np.dtype[np.void]) -> NDArray[np.void]:
+    """The element's rows, fewer where the file ends early."""
+    return np.frombuffer(data, dtype, min((len(data) - at) // dtype.itemsize, count), at)
+
+
+def _ascii_rows(
+    tokens: list[bytes], at: int, element: _Element, dtype: np.dtype[np.void], path: Path
+) -> tuple[NDArray[np.void], int]:
+    """The element's rows, fewer where the file ends early, and the token after them."""
+    flat = np.dtype([(name, "f8", dtype[name].shape) for name in dtype.names or ()])
+    width = flat.itemsize // 8
+    mine = tokens[at : at + element.count * width]
+    try:
+        numbers = np.array(mine[: len(mine) // width * width], dtype=np.float64)
+    except ValueError:
+        raise InputError(f"{path}: {element.name} holds something that is no number; {_ANEW}") from None
+    return numbers.view(flat), at + element.count * width
+
+
+def _check_whole(rows: NDArray[np.void], element: _Element, path: Path) -> None:
+    """As many rows as the header says; a polygon shifts all that follows it, so it is named first."""
+    if "corners" in (rows.dtype.names or ()):
+        other = rows["corners"] != 3
+        if other.any():
+            i = int(np.flatnonzero(other)[0])
+            raise InputError(f"{path}: face {i} has {int(rows['corners'][i])} corners; triangulate the mesh")
+    if len(rows) < element.count:
+        raise InputError(
+            f"{path}: is cut off: the header says {element.count} {element.name} rows, "
+            f"the file holds {len(rows)}; copy or export it anew"
+        )
+
+
+def _check_vertices(rows: NDArray[np.void], path: Path) -> None:
+    if not {"x", "y", "z"} <= set(rows.dtype.names or ()):
+        raise InputError(f"{path}: vertices have no x, y, z; {_ANEW}")
+    check_positions(np.stack([rows[axis] for axis in "xyz"], axis=1), str(path))
+
+
+def _check_faces(rows: NDArray[np.void], vertices: int | None, path: Path) -> None:
+    if "vertices" not in (rows.dtype.names or ()):
+        raise InputError(f"{path}: faces have no vertex_indices; {_ANEW}")
+    if vertices is None:
+        raise InputError(f"{path}: faces come before vertices; {_ANEW}")
+    bad = ((rows["vertices"] < 0) | (rows["vertices"] >= vertices)).any(axis=1)
+    if bad.any():
+        i = int(np.flatnonzero(bad)[0])
+        named = ", ".join(f"{int(v)}" for v in rows["vertices"][i])
+        raise InputError(f"{path}: face {i} joins vertices {named}, but there are {vertices}; {_ANEW}")

@@ -1,0 +1,181 @@
+"""Mitsuba's emitters as sources of waves."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Collection, Iterable
+from difflib import get_close_matches
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from grimaldi.errors import GrimaldiWarning, InputError
+from grimaldi.scene.model import Scene, Source
+
+COHERENT_GROUP = "0"
+
+_DIFFRACTING = ("coherent_point", "coherent_directional", "PointLight", "DirectionalEmitter")
+
+
+def sources(mi_scene: Any, *, coherent: Collection[str] = ()) -> tuple[Source, ...]:
+    """The scene's sources of waves (THEORY eq. 1, 2), in the order of `mi.Scene.emitters()`.
+
+    `coherent_point` and `coherent_directional` bring amplitude, phase and group. Of Mitsuba's `point` and
+    `directional` the amplitude is the square root of the intensity or irradiance, averaged over the colour
+    channels, the phase is 0, and each is a group of its own, named after it.
+
+    Args:
+        mi_scene: a Mitsuba scene in a mono or rgb variant.
+        coherent: ids of Mitsuba's `point` and `directional` that join group "0".
+
+    Raises:
+        InputError: a spectral or polarized variant; an intensity that is negative or not finite; an id in
+            `coherent` that no such emitter has.
+
+    Warns:
+        GrimaldiWarning: naming the emitters that stay ordinary light.
+    """
+    found: list[Source] = []
+    ordinary: list[str] = []
+    names = _unique_names(mi_scene.emitters())
+    for emitter, name in zip(mi_scene.emitters(), names, strict=True):
+        if _kind(emitter) in _DIFFRACTING:
+            _check_variant()
+            found.append(_source(emitter, name, coherent))
+        else:
+            ordinary.append(f"{name} ({emitter.class_name()})")
+    _check_ids(coherent, [source.name for source in found])
+    if ordinary:
+        warnings.warn(
+            f"{', '.join(ordinary)}: stays ordinary light and does not diffract yet",
+            GrimaldiWarning,
+            stacklevel=2,
+        )
+    return tuple(found)
+
+
+def _kind(emitter: Any) -> str:
+    """Our plugin's name, or Mitsuba's class (our classes' own is `Emitter` there)."""
+    return getattr(emitter, "plugin_name", emitter.class_name())
+
+
+def _source(emitter: Any, name: str, coherent: Collection[str]) -> Source:
+    kind = _kind(emitter)
+    if kind == "coherent_point":
+        return Source(name, **_own(emitter), position=_numbers(emitter.position))
+    if kind == "coherent_directional":
+        return Source(name, **_own(emitter), direction=_unit(_numbers(emitter.direction)))
+    power = _power(emitter, name)
+    mean = float(power.mean())
+    common: dict[str, Any] = {
+        "group": COHERENT_GROUP if name in coherent else name,
+        "amplitude": float(np.sqrt(mean)),
+        "phase": 0.0,
+        "tint": tuple((power / mean).tolist()) if mean > 0 else (1.0,) * len(power),
+    }
+    if kind == "PointLight":
+        return Source(name, **common, position=_numbers(_parameter(emitter, "position")))
+    to_world = _numbers(_parameter(emitter, "to_world").matrix).reshape(4, 4)
+    return Source(name, **common, direction=_unit(to_world[:3, 2]), origin=to_world[:3, 3].copy())
+
+
+def _own(emitter: Any) -> dict[str, Any]:
+    """What both coherent emitters have."""
+    return {
+        "group": emitter.group,
+        "amplitude": float(_numbers(emitter.amplitude)[0]),
+        "phase": float(_numbers(emitter.phase)[0]),
+        "tint": (1.0,) * _channels(),
+    }
+
+
+def _power(emitter: Any, name: str) -> NDArray[np.float64]:
+    """Radiant intensity of a `point`, irradiance of a `directional`, per channel."""
+    import drjit as dr
+    import mitsuba as mi
+
+    it = dr.zeros(mi.SurfaceInteraction3f)
+    if _kind(emitter) == "PointLight":
+        # As far away as the position's own size: there Float32 keeps the distance.
+        position = _numbers(_parameter(emitter, "position"))
+        beside = position + np.array([max(1.0, float(np.abs(position).max())), 0.0, 0.0])
+        it.p = mi.Point3f(beside.tolist())
+    ds, weight = emitter.sample_direction(it, mi.Point2f(0.5))
+    power = _numbers(weight)
+    if _kind(emitter) == "PointLight":
+        power = power * _numbers(ds.dist) ** 2
+    if not (np.isfinite(power).all() and (power >= 0).all()):
+        raise InputError(f"{name}: the light's power is {power.tolist()}; give finite values of 0 or more")
+    return power
+
+
+def _parameter(emitter: Any, name: str) -> Any:
+    import mitsuba as mi
+
+    return mi.traverse(emitter)[name]
+
+
+def _numbers(value: Any) -> NDArray[np.float64]:
+    """A Dr.Jit value, or a plain number, as a flat array."""
+    return np.array(value, dtype=np.float64).reshape(-1)
+
+
+def _unit(direction: NDArray[np.float64]) -> NDArray[np.float64]:
+    return direction / np.linalg.norm(direction)
+
+
+def _channels() -> int:
+    import mitsuba as mi
+
+    return 1 if mi.is_monochromatic else 3
+
+
+def _check_variant() -> None:
+    import mitsuba as mi
+
+    if mi.is_spectral or mi.is_polarized:
+        raise InputError(
+            f"variant {mi.variant()}: waves are computed in mono and rgb variants; set 'llvm_ad_rgb', say"
+        )
+
+
+def _unique_names(emitters: Iterable[Any]) -> list[str]:
+    """Each emitter's id, or its kind; none twice, and none that is the coherent group's name."""
+    taken = {COHERENT_GROUP}
+    names: list[str] = []
+    for emitter in emitters:
+        base = name = emitter.id() or _kind(emitter)
+        count = 1
+        while name in taken:
+            count += 1
+            name = f"{base}-{count}"
+        taken.add(name)
+        names.append(name)
+    return names
+
+
+def _check_ids(coherent: Collection[str], names: list[str]) -> None:
+    for name in coherent:
+        if name not in names:
+            nearest = get_close_matches(name, names, n=1)
+            advice = (
+                f"did you mean {nearest[0]!r}?" if nearest else f"the scene has {', '.join(names) or 'none'}"
+            )
+            raise InputError(f"coherent: no source has the id {name!r}; {advice}")
+
+
+def pick_source(scene: Scene, name: str | None = None) -> Source:
+    """The scene's source of that name, or its only one.
+
+    Raises InputError naming the nearest, or all where none was asked for.
+    """
+    names = [source.name for source in scene.sources]
+    if name is None and len(names) == 1:
+        return scene.sources[0]
+    if name is None:
+        raise InputError(f"{scene.name}: has {len(names)} sources; name one of {', '.join(names)}")
+    if name not in names:
+        nearest = get_close_matches(name, names, n=1, cutoff=0.0) or ["none"]
+        raise InputError(f"{scene.name}: has no source {name!r}; the nearest is {nearest[0]}")
+    return scene.sources[names.index(name)]
