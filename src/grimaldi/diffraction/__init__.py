@@ -1,0 +1,20 @@
+"""Diffraction models, one a file, behind one interface (`model.Model`)."""
+
+from __future__ import annotations
+
+from grimaldi.diffraction.model import Model
+from grimaldi.errors import InputError
+
+
+def model(name: str) -> Model:
+    """The model called `name`: "boundary" or "none".
+
+    Raises InputError for any other name.
+    """
+    from grimaldi.diffraction.boundary import boundary
+    from grimaldi.diffraction.none import none
+
+    models: dict[str, Model] = {"boundary": boundary, "none": none}
+    if name not in models:
+        raise InputError(f"diffraction: {name!r} is no model; use one of {', '.join(models)}")
+    return models[name]

@@ -28,6 +28,14 @@ class Outline:
     normals: Reals  # (n, 2, 3) unit normals of the two faces beside, towards the source first; 0 where there is none
     outward: Reals  # (n, 3) unit, across the ray from the source, towards the open side
     chain: Integers  # (n,) segments of one chain follow each other in the arrays, end to start
+    sag: float = 0.0  # how far a segment may lie from the curve that it stands for [scene units]
 
     def __len__(self) -> int:
         return len(self.start)
+
+    @staticmethod
+    def empty() -> Outline:
+        """Nothing stands in the light."""
+        none = np.empty(0, np.int64)
+        points = np.empty((0, 3))
+        return Outline(points, points, none, none, np.empty((0, 2)), np.empty((0, 2, 3)), points, none)

@@ -88,3 +88,8 @@ class Scene:
     holes: tuple[PlanarOutline, ...] = ()
     masks: tuple[PlanarOutline, ...] = ()
     unit: str | None = None  # length of one scene unit, as text for pint: "1 um"
+
+    @property
+    def screen(self) -> tuple[PlanarOutline, ...]:
+        """The planar outlines that act: the holes of the one screen, or the masks."""
+        return self.holes or self.masks

@@ -1,0 +1,38 @@
+"""The Dr.Jit array types of the current Mitsuba variant, in either precision."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from grimaldi.errors import InputError
+
+
+class Types(NamedTuple):
+    """Array types of one precision."""
+
+    Float: Any
+    Vector: Any
+    Packet: Any  # four floats of a record, read at once
+
+    def buffer(self, values: NDArray[Any]) -> Any:
+        """Numbers as one flat device buffer."""
+        dtype = np.float64 if dr.itemsize_v(self.Float) == 8 else np.float32
+        return self.Float(np.ascontiguousarray(values, dtype).ravel())
+
+
+def types(double: bool) -> Types:
+    """Float64 or Float32 arrays of the variant in use."""
+    variant = mi.variant() or ""
+    if variant.startswith("scalar"):
+        raise InputError(
+            f"variant {variant}: waves need an llvm or cuda variant; use llvm_ad_rgb or llvm_ad_mono"
+        )
+    ad = dr.cuda.ad if variant.startswith("cuda") else dr.llvm.ad
+    if double:
+        return Types(ad.Float64, ad.Array3f64, ad.Array4f64)
+    return Types(ad.Float, ad.Array3f, ad.Array4f)

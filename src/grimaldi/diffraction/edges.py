@@ -1,0 +1,220 @@
+"""Sums of boundary waves over outlines, and on which side of them a ray runs (THEORY eq. 4-6).
+
+The sum and n take the side of an edge from the same κ, so that M runs smoothly through the shadow's rim.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from grimaldi.diffraction.frame import constant
+from grimaldi.diffraction.model import Receivers
+from grimaldi.diffraction.occlusion import Rays
+from grimaldi.diffraction.segment import Frame, Line, Rule, detour, line, segment_wave, stationary
+from grimaldi.diffraction.table import Piece, Segment, Table
+
+
+class Sum(NamedTuple):
+    """Σ ∫ C e^{ikΔ} dφ and its error estimate."""
+
+    real: Any
+    imag: Any
+    err_real: Any
+    err_imag: Any
+
+
+class Nearest(NamedTuple):
+    """The outline that the ray S→P passes closest by."""
+
+    distance2: Any
+    segment: Any
+    piece: Any
+
+
+def _basis(a: Any) -> tuple[Any, Any]:
+    """Two unit vectors across a (Duff et al., JCGT 6(1))."""
+    V = type(a)
+    sign = dr.copysign(type(a.x)(1), a.z)
+    c = -1 / (sign + a.z)
+    b = a.x * a.y * c
+    return V(1 + sign * a.x * a.x * c, sign * b, -sign * a.x), V(b, sign + a.y * a.y * c, -a.y)
+
+
+def _turn(frame: Frame, seg: Segment, across: Any, kappa: Any) -> tuple[Any, Any]:
+    """Whether a segment crosses the half-plane from the ray on which `across`·q = 0, as ±1 or 0, and how far out.
+
+    `across` is unit, a quarter turn ahead of the half-plane. Summed over a closed loop this is (1/2π)∮dφ;
+    the side of the ray comes from κ, as in the boundary wave itself.
+    """
+    c0 = dr.dot(seg.X0 - frame.foot, across)
+    c1 = dr.dot(seg.X1 - frame.foot, across)
+    out = kappa * seg.length / (c1 - c0)
+    straddles = (c0 > 0) != (c1 > 0)
+    return dr.select(straddles, dr.select(c1 > c0, type(out)(1), type(out)(-1)), 0), out
+
+
+# ---------------------------------------------------------------- planar holes and masks
+
+
+@dr.syntax
+def planar_sum(fr: Frame, tab: Table, k: float, rule: Rule, active: Any) -> tuple[Sum, Any]:
+    """The sum over whole planar loops, nothing in between, and n = (1/2π)∮dφ as an exact count."""
+    F = tab.types.Float
+    real, imag, err_real, err_imag = F(0), F(0), F(0), F(0)
+    n, j = F(0), dr.uint32_array_t(F)(0)
+    _, across = _basis(fr.a)
+    while active & (j < tab.size):
+        seg = tab.segment(j)
+        re, im, er, ei, kappa = segment_wave(fr, seg.X0, seg.e, seg.length, k, rule, active)
+        turn, out = _turn(fr, seg, across, kappa)
+        n += dr.select(out > 0, turn, 0)
+        real, imag, err_real, err_imag = real + re, imag + im, err_real + er, err_imag + ei
+        j += 1
+    return Sum(real, imag, err_real, err_imag), n
+
+
+@dr.syntax
+def planar_count(fr: Frame, tab: Table, active: Any) -> Any:
+    """n of `planar_sum` alone."""
+    F = tab.types.Float
+    n, j = F(0), dr.uint32_array_t(F)(0)
+    _, across = _basis(fr.a)
+    while active & (j < tab.size):
+        seg = tab.segment(j)
+        turn, out = _turn(fr, seg, across, line(fr, seg.X0, seg.e).kappa)
+        n += dr.select(out > 0, turn, 0)
+        j += 1
+    return n
+
+
+# ---------------------------------------------------------------- bodies
+
+
+def _acts(fr: Frame, piece: Piece, n: Any) -> Any:
+    """Whether an outline piece can send a wave to a receiver at all (THEORY 2).
+
+    A receiver on a surface, normal n, hears only what rises above its horizon: so a body's own outline does not
+    act on its lit side, nor an edge that touches the receiver. The border of a sheet does not act on the side
+    that the source lights.
+    """
+    d = fr.foot + fr.z2 * fr.a - piece.middle  # X→P
+    length = dr.norm(d)
+    free = dr.squared_norm(n) == 0
+    above = free | (dr.dot(n, d) < -1e-4 * length)
+    behind = (piece.closed > 0.5) | (dr.dot(piece.lit, d) < -1e-6 * length)
+    return above & behind
+
+
+def _matters(fr: Frame, piece: Piece, e: Any, k: float, share: float) -> Any:
+    """Whether the chain's wave, cut off somewhere on this piece, would exceed `share` of M.
+
+    The end of a chain sends |M| = √D / (4π (D + w) √w), D = kΔs at the stationary point, w = k(Δ - Δs).
+    """
+    ln = line(fr, piece.middle, e)
+    st = stationary(fr, ln, (e - ln.ea * fr.a, ln.q0))
+    D, _, _, _ = detour(fr, ln, st.t, ln.eqq * (dr.square(st.t - ln.td) + ln.w * ln.w))
+    D = dr.maximum(k * D, 0.01)
+    w = dr.maximum(k * st.growth(dr.maximum(dr.abs(st.t) - piece.reach, 0)), 0.1)
+    return dr.sqrt(D) > 4 * np.pi * share * (D + w) * dr.sqrt(w)
+
+
+def _closest(fr: Frame, seg: Segment, ln: Line) -> Any:
+    """Squared distance of the ray S→P to a segment, infinite outside of S..P."""
+    t = dr.clip(ln.td, 0, seg.length)
+    along = ln.h + t * ln.ea
+    between = fr.z2 - along > 0
+    if not fr.plane:
+        between &= fr.z1 + along > 0
+    return dr.select(between, ln.eqq * (dr.square(t - ln.td) + ln.w * ln.w), dr.inf)
+
+
+@dr.syntax
+def body_sum(
+    fr: Frame, tab: Table, k: float, rule: Rule, share: float, probe: Rays | None, receivers: Receivers
+) -> tuple[Sum, Nearest]:
+    """The sum over the outlines of bodies, piece by piece, each only where it reaches the receiver."""
+    F = tab.types.Float
+    U = dr.uint32_array_t(F)
+    n = tab.types.Vector(receivers.n)
+    p = mi.Point3f(receivers.p)
+    real, imag, err_real, err_imag = F(0), F(0), F(0), F(0)
+    nearest2, nearest_segment, nearest_piece = F(dr.inf), U(0), U(0)
+    i = U(0)
+    while receivers.active & (i < tab.count):
+        piece = tab.piece(i)
+        acts = _acts(fr, piece, n)
+        if dr.hint(probe is not None, mode="scalar"):
+            tested = acts & _matters(fr, piece, tab.segment(piece.first).e, k, share)
+            if tested:
+                x = mi.Point3f(piece.middle + constant(tab.types.Vector, tab.centre))
+                acts = acts & probe.reaches(x, piece, p, tested)
+        j = U(piece.first)
+        while acts & (j < piece.end):
+            seg = tab.segment(j)
+            re, im, er, ei, _ = segment_wave(fr, seg.X0, seg.e, seg.length, k, rule, acts)
+            real, imag, err_real, err_imag = real + re, imag + im, err_real + er, err_imag + ei
+            d2 = _closest(fr, seg, line(fr, seg.X0, seg.e))
+            closer = d2 < nearest2
+            nearest2 = dr.select(closer, d2, nearest2)
+            nearest_segment = dr.select(closer, j, nearest_segment)
+            nearest_piece = dr.select(closer, i, nearest_piece)
+            j += 1
+        i += 1
+    return Sum(real, imag, err_real, err_imag), Nearest(nearest2, nearest_segment, nearest_piece)
+
+
+@dr.syntax
+def _crossings(fr: Frame, tab: Table, bend: Any, n: Any, active: Any) -> Any:
+    """Signed count of outlines between the straight way S→P and the bent one S→`bend`→P."""
+    F = tab.types.Float
+    U = dr.uint32_array_t(F)
+    x = bend - fr.foot
+    along = dr.dot(x, fr.a)
+    q = x - along * fr.a
+    height = dr.norm(q)
+    across = dr.cross(fr.a, q / height)
+    count, i = F(0), U(0)
+    while active & (i < tab.count):
+        piece = tab.piece(i)
+        acts = _acts(fr, piece, n)
+        j = U(piece.first)
+        while acts & (j < piece.end):
+            seg = tab.segment(j)
+            ln = line(fr, seg.X0, seg.e)
+            turn, out = _turn(fr, seg, across, ln.kappa)
+            z = ln.h + ln.ea * dr.clip(ln.td, 0, seg.length)
+            # the bent way is a triangle over the ray, `height` high where it bends
+            top = (fr.z2 - z) / (fr.z2 - along)
+            if not fr.plane:
+                top = dr.minimum(top, (fr.z1 + z) / (fr.z1 + along))
+            count += dr.select((out > 0) & (out < height * dr.minimum(top, 1)), turn, 0)
+            j += 1
+        i += 1
+    return count
+
+
+@dr.syntax
+def lit_share(fr: Frame, tab: Table, nearest: Nearest, probe: Rays, rim: float, receivers: Receivers) -> Any:
+    """1 - n: 1 where the ray S→P is free, 0 where it meets a lit surface.
+
+    A traced ray settles it, but not within `rim` of an outline, where Float32 rays and the outline disagree now
+    and then: there a ray is traced that bends round the open side, and the outlines between the two are counted.
+    """
+    F = tab.types.Float
+    V = tab.types.Vector
+    p = mi.Point3f(receivers.p) + probe.epsilon * receivers.n
+    lit = dr.select(probe.lit(p, receivers.active), F(1), F(0))
+    near = receivers.active & (nearest.distance2 < rim * rim)
+    if near:
+        seg = tab.segment(nearest.segment)
+        piece = tab.piece(nearest.piece)
+        ln = line(fr, seg.X0, seg.e)
+        bend = seg.X0 + dr.clip(ln.td, 0, seg.length) * seg.e + 3 * rim * piece.outward
+        x = mi.Point3f(bend + constant(V, tab.centre))
+        free = probe.lit(x, near) & probe.clear(p, x, near)
+        lit = dr.clip(dr.select(free, F(1), F(0)) - _crossings(fr, tab, bend, V(receivers.n), near), 0, 1)
+    return lit

@@ -1,0 +1,60 @@
+"""The ray from a source to a point, seen from the outlines: computed in Float64, used in either precision."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import drjit as dr
+import numpy as np
+
+from grimaldi.diffraction.arrays import Types, types
+from grimaldi.diffraction.segment import Frame
+from grimaldi.scene.model import Source, Vector
+
+
+def constant(Vector3: Any, v: Vector) -> Any:
+    """A NumPy vector as a Dr.Jit one."""
+    return Vector3(*(float(x) for x in v))
+
+
+def frame(source: Source, p: Any, centre: Vector, out: Types) -> Frame:
+    """The frame of every ray source → p (Float64), about `centre` (3,), in the precision `out`.
+
+    The cancellation q = X - S - z1 a is done here, against the foot of `centre` on the ray, so that Float32
+    coordinates stay small however far S and P are (THEORY 2, "Consequences").
+    """
+    V = types(double=True).Vector
+    c = constant(V, centre)
+    if source.is_plane:
+        assert source.direction is not None
+        a = constant(V, source.direction)
+        z1 = type(p.x)(0)
+        z2 = dr.dot(p - c, a)
+        foot = p - z2 * a - c
+    else:
+        assert source.position is not None
+        s = constant(V, source.position)
+        d = p - s
+        distance = dr.norm(d)
+        a = d / distance
+        z1 = dr.dot(c - s, a)
+        z2 = distance - z1
+        foot = s - c + z1 * a
+    return Frame(out.Vector(a), out.Vector(foot), out.Float(z1), out.Float(z2), source.is_plane)
+
+
+def incident(source: Source, p: Any, k: float) -> tuple[Any, Any, Any]:
+    """U0 at p (Float64) by eq. 1-2: its modulus, cosine and sine of its phase, reduced in Float64."""
+    V = types(double=True).Vector
+    if source.is_plane:
+        assert source.direction is not None
+        path = dr.dot(p - constant(V, source.origin), constant(V, source.direction))
+        modulus = type(path)(source.amplitude)
+    else:
+        assert source.position is not None
+        path = dr.norm(p - constant(V, source.position))
+        modulus = source.amplitude / path
+    turns = path * (k / (2 * np.pi))
+    phase = 2 * np.pi * (turns - dr.round(turns)) + source.phase
+    sin, cos = dr.sincos(phase)
+    return modulus, cos, sin

@@ -1,0 +1,46 @@
+"""The interface of a diffraction model: (scene, source, outline) → a function from points to M and its error."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Literal, NamedTuple
+
+from grimaldi.outlines.model import Outline
+from grimaldi.scene.model import Scene, Source
+
+Precision = Literal["auto", "double"]
+
+
+@dataclass(frozen=True)
+class Options:
+    """What every model is asked for.
+
+    tolerance: |M_computed - M| allowed for each source and point; precision: "auto" or "double";
+    occlusion: whether bodies block the way from an outline to a point.
+    """
+
+    tolerance: float = 1e-3
+    precision: Precision = "auto"
+    occlusion: bool = True
+
+
+class Receivers(NamedTuple):
+    """Points where the field is asked, as Dr.Jit arrays; part of a traced kernel."""
+
+    p: Any  # Float64 (3)
+    n: Any  # unit normal of the surface the point lies on, towards the side that is asked; 0 in free space
+    active: Any
+
+
+class Factor(NamedTuple):
+    """M = U/U0 at the receivers and the estimated |M_computed - M|."""
+
+    real: Any
+    imag: Any
+    error: Any
+
+
+Evaluate = Callable[[Receivers], Factor]
+Model = Callable[[Scene, Source, Outline, float, Options], Evaluate]
+"""model(scene, source, outline, k, options); a pure function of blocks of points, traceable by Dr.Jit."""

@@ -1,0 +1,67 @@
+"""Geometrical optics: M is 1 in the light and 0 in the shadow."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+
+from grimaldi.diffraction.arrays import types
+from grimaldi.diffraction.edges import planar_count
+from grimaldi.diffraction.frame import constant, frame
+from grimaldi.diffraction.model import Evaluate, Factor, Options, Receivers
+from grimaldi.diffraction.screen import beyond
+from grimaldi.diffraction.table import table
+from grimaldi.outlines.model import Outline
+from grimaldi.scene.model import Scene, Source
+
+
+def none(scene: Scene, source: Source, outline: Outline, k: float, options: Options) -> Evaluate:
+    """The `none` model: one shadow ray to the source as Mitsuba traces it, or what a planar hole lets through.
+
+    Raises InputError in variants without vectorised arrays.
+    """
+    if scene.screen:
+        return _planar(scene, source, outline)
+
+    def evaluate(receivers: Receivers) -> Factor:
+        zero = types(double=False).Float(0)
+        lit = _lit(scene, source, receivers) if scene.blockers is not None else receivers.active
+        return Factor(dr.select(lit, 1.0, zero), zero, zero)
+
+    return evaluate
+
+
+def _lit(scene: Scene, source: Source, receivers: Receivers) -> Any:
+    """Mitsuba's own shadow ray (`SurfaceInteraction.spawn_ray_to`), so that `none` equals its `direct`."""
+    p = mi.Point3f(receivers.p)
+    if source.is_plane:
+        assert source.direction is not None
+        d = constant(mi.Vector3f, -source.direction)
+    else:
+        assert source.position is not None
+        target = constant(mi.Point3f, source.position)
+        d = target - p
+    lift = (1 + dr.max(dr.abs(p))) * mi.math.RayEpsilon
+    origin = p + dr.mulsign(lift, dr.dot(receivers.n, d)) * receivers.n
+    if source.is_plane:
+        return ~scene.blockers.ray_test(mi.Ray3f(origin, d), receivers.active)
+    d = target - origin
+    distance = dr.norm(d)
+    ray = mi.Ray3f(origin, d / distance, distance * (1 - mi.math.ShadowEpsilon), 0, mi.Color0f())
+    return ~scene.blockers.ray_test(ray, receivers.active)
+
+
+def _planar(scene: Scene, source: Source, outline: Outline) -> Evaluate:
+    tab = table(outline, types(double=True))
+    far = beyond(scene.screen[0], source)
+
+    def evaluate(receivers: Receivers) -> Factor:
+        shaded = receivers.active & far(receivers.p)
+        n = planar_count(frame(source, receivers.p, tab.centre, tab.types), tab, shaded)
+        passed = n if scene.screen[0].hole else 1 - n
+        zero = tab.types.Float(0)
+        return Factor(dr.select(shaded, passed, 1), zero, zero)
+
+    return evaluate

@@ -1,0 +1,83 @@
+"""What blocks S→P, and what blocks X→P (THEORY 2, "Which outlines, and what blocks X→P")."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from grimaldi.diffraction.frame import constant
+from grimaldi.diffraction.table import Piece
+from grimaldi.scene.model import Mesh, Scene, Source, Sphere
+
+
+class Rays(NamedTuple):
+    """Visibility rays among the bodies of one scene, for one source."""
+
+    blockers: Any
+    source: Source
+    epsilon: float  # what Float32 coordinates of the scene cannot tell apart, with room [scene units]
+
+    def clear(self, origin: Any, target: Any, active: Any) -> Any:
+        """Whether nothing stands on origin→target."""
+        d = target - origin
+        return ~self.blockers.ray_test(
+            mi.Ray3f(origin, d, 1 - self.epsilon / dr.norm(d), 0, mi.Color0f()), active
+        )
+
+    def toward(self, p: Any) -> Any:
+        """The unit direction from points to the source."""
+        if self.source.position is not None:
+            return dr.normalize(constant(mi.Point3f, self.source.position) - p)
+        assert self.source.direction is not None
+        return constant(mi.Vector3f, -self.source.direction)
+
+    def lit(self, origin: Any, active: Any) -> Any:
+        """Whether nothing stands between points and the source."""
+        if self.source.position is not None:
+            return self.clear(origin, constant(mi.Point3f, self.source.position), active)
+        return ~self.blockers.ray_test(mi.Ray3f(origin, self.toward(origin)), active)
+
+    @dr.syntax
+    def reaches(self, x: Any, piece: Piece, p: Any, active: Any) -> Any:
+        """Whether the wave from x on an outline piece reaches p.
+
+        A last stretch of p→x that runs inside the body ending at x does not block: a smooth body's own bulge
+        always stands there. Inside means behind both faces at x, and no surface between the first hit and x;
+        the border of a sheet has no inside.
+        """
+        d = x - p
+        length = dr.norm(d)
+        d = d / length
+        end = length - 4 * self.epsilon
+        hit = self.blockers.ray_intersect_preliminary(mi.Ray3f(p, d, end, 0, mi.Color0f()), active=active)
+        blocked = hit.is_valid()
+        inside = (piece.closed > 0.5) & (dr.dot(piece.lit, d) > 0) & (dr.dot(piece.dark, d) > 0)
+        if active & blocked & inside:
+            start = hit.t + self.epsilon
+            blocked = self.blockers.ray_test(
+                mi.Ray3f(p + start * d, d, end - start, 0, mi.Color0f()), active & (end > start)
+            )
+        return ~blocked
+
+
+def extent(scene: Scene, source: Source) -> float:
+    """The largest coordinate of the bodies and the source."""
+    reach = 0.0 if source.position is None else float(np.abs(source.position).max())
+    for body in scene.bodies:
+        g = body.geometry
+        if isinstance(g, Mesh):
+            far = float(np.abs(g.vertices).max())
+        elif isinstance(g, Sphere):
+            far = float(np.abs(g.centre).max()) + g.radius
+        else:
+            far = float(np.abs(g.to_world[:3]).sum(1).max())
+        reach = max(reach, far)
+    return reach
+
+
+def rays(scene: Scene, source: Source) -> Rays:
+    """Visibility rays for one source of a scene that has bodies."""
+    return Rays(scene.blockers, source, 4e-6 * extent(scene, source))

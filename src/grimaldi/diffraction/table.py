@@ -1,0 +1,112 @@
+"""Outlines packed for the kernel: segments, and the pieces of chain that share one visibility ray."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import drjit as dr
+import numpy as np
+from numpy.typing import NDArray
+
+from grimaldi.diffraction.arrays import Types
+from grimaldi.outlines.model import Outline
+from grimaldi.scene.model import Vector
+
+LONGEST_PIECE = 8  # segments
+
+
+class Segment(NamedTuple):
+    X0: Any
+    X1: Any
+    e: Any
+    length: Any
+
+
+class Piece(NamedTuple):
+    """A few neighbouring segments; its middle vertex stands for all in the tests of what blocks X→P."""
+
+    first: Any
+    end: Any
+    middle: Any
+    reach: Any  # half its length
+    lit: Any  # normals of the faces at the middle, towards the source first
+    dark: Any
+    closed: Any  # 1 where two faces meet, 0 at the border of a sheet
+    outward: Any
+
+
+class Table(NamedTuple):
+    """An outline about its centre (3,) in Float64, as flat device buffers."""
+
+    centre: Vector
+    size: int  # segments
+    count: int  # pieces
+    segments: Any
+    ranges: Any
+    pieces: Any
+    types: Types
+
+    def segment(self, i: Any) -> Segment:
+        P, V = self.types.Packet, self.types.Vector
+        a, b, c = (dr.gather(P, self.segments, 3 * i + j) for j in range(3))
+        return Segment(V(a.x, a.y, a.z), V(b.x, b.y, b.z), V(c.x, c.y, c.z), a.w)
+
+    def piece(self, i: Any) -> Piece:
+        P, V = self.types.Packet, self.types.Vector
+        a, b, c, d = (dr.gather(P, self.pieces, 4 * i + j) for j in range(4))
+        index = type(self.ranges)
+        return Piece(
+            dr.gather(index, self.ranges, i),
+            dr.gather(index, self.ranges, i + 1),
+            V(a.x, a.y, a.z),
+            a.w,
+            V(b.x, b.y, b.z),
+            V(c.x, c.y, c.z),
+            b.w,
+            V(d.x, d.y, d.z),
+        )
+
+
+def cut(outline: Outline, longest: float) -> NDArray[np.int64]:
+    """First segments of the pieces, and the number of segments: runs of a chain no longer than `longest`."""
+    lengths = np.linalg.norm(outline.end - outline.start, axis=1)
+    first, in_piece, total = [], 0, 0.0
+    for i, (length, chain) in enumerate(zip(lengths, outline.chain, strict=True)):
+        if i == 0 or chain != outline.chain[i - 1] or in_piece == LONGEST_PIECE or total + length > longest:
+            first.append(i)
+            in_piece, total = 0, 0.0
+        in_piece += 1
+        total += length
+    return np.array([*first, len(lengths)], np.int64)
+
+
+def table(outline: Outline, types: Types) -> Table:
+    """Pack an outline; pieces are at most a 64th of its extent."""
+    ends = np.concatenate([outline.start, outline.end])
+    low, high = ends.min(0), ends.max(0)
+    centre = 0.5 * (low + high)
+    ranges = cut(outline, float(np.linalg.norm(high - low)) / 64)
+    X0, X1 = outline.start - centre, outline.end - centre
+    length = np.linalg.norm(X1 - X0, axis=1, keepdims=True)
+    zero = np.zeros_like(length)
+    segments = np.concatenate([X0, length, X1, zero, (X1 - X0) / length, zero], 1)
+    middle = (ranges[:-1] + ranges[1:]) // 2
+    several = (ranges[1:] - ranges[:-1] > 1)[:, None]
+    target = np.where(several, X0[middle], 0.5 * (X0[middle] + X1[middle]))
+    reach = 0.5 * np.add.reduceat(length[:, 0], ranges[:-1])[:, None]
+    normals = outline.normals[middle]
+    closed = (np.linalg.norm(normals[:, 1], axis=1) > 0).astype(float)[:, None]
+    none = np.zeros_like(reach)
+    pieces = np.concatenate(
+        [target, reach, normals[:, 0], closed, normals[:, 1], none, outline.outward[middle], none], 1
+    )
+    index = dr.uint32_array_t(types.Float)
+    return Table(
+        centre,
+        len(outline),
+        len(middle),
+        types.buffer(segments),
+        index(ranges.astype(np.uint32)),
+        types.buffer(pieces),
+        types,
+    )

@@ -1,0 +1,59 @@
+"""A wave at given points, block by block: each block a pure function of its points."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from grimaldi.diffraction.model import Receivers
+    from grimaldi.propagate import Wave
+    from grimaldi.scene.model import Scene, Source
+
+BLOCK = 1 << 16  # points: about a second of work for a thousand segments, a few hundred bytes each
+
+
+def at_points(
+    wave: Callable[[Receivers], Wave], scene: Scene, source: Source, points: NDArray[np.float64]
+) -> Iterator[tuple[slice, NDArray[np.complex128], NDArray[np.float64]]]:
+    """For each block of points (n, 3): which they are, U complex128 and |U_computed - U| float64 there."""
+    import drjit as dr
+
+    from grimaldi.diffraction.arrays import types
+    from grimaldi.diffraction.model import Receivers
+
+    double = types(double=True)
+    normals = surface_normals(scene, source)
+    for first in range(0, len(points), BLOCK):
+        block = slice(first, min(first + BLOCK, len(points)))
+        p = double.Vector(*(double.buffer(points[block, i]) for i in range(3)))
+        n = normals(p)
+        u = wave(Receivers(p, n, dr.mask_t(p.x)(True)))
+        dr.eval(u)
+        yield block, u.real.numpy() + 1j * u.imag.numpy(), u.error.numpy()
+
+
+def surface_normals(scene: Scene, source: Source) -> Callable[[Any], Any]:
+    """A function of points: the unit normal, towards the source, of the body surface they lie on; 0 elsewhere."""
+    import drjit as dr
+    import mitsuba as mi
+
+    from grimaldi.diffraction.occlusion import rays
+
+    if scene.blockers is None:
+        return lambda p: dr.zeros(mi.Vector3f, dr.width(p))
+    probe = rays(scene, source)
+
+    def normals(p: Any) -> Any:
+        """What a short ray from the source's side runs into."""
+        x = mi.Point3f(p)
+        w = probe.toward(x)
+        reach = 4 * probe.epsilon
+        hit = scene.blockers.ray_intersect(mi.Ray3f(x + reach * w, -w, 2 * reach, 0, mi.Color0f()))
+        n = dr.mulsign(mi.Vector3f(hit.n), dr.dot(hit.n, w))
+        return dr.select(hit.is_valid(), n, 0)
+
+    return normals

@@ -1,0 +1,27 @@
+"""Outlines: the edges that bound a source's light, as that source sees them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from grimaldi.outlines.model import Outline
+from grimaldi.scene.model import Source
+
+
+def outline(scene: Any, source: Source | str | None = None, *, sag: float | None = None) -> Outline:
+    """The lit outlines that a source of a scene sees.
+
+    Args:
+        scene: whatever `grimaldi.load` takes.
+        source: a source of the scene or its name; may be left out where there is only one.
+        sag: how far the polygon of a smooth outline may lie from it [scene units]; 1e-4 of its size by default.
+
+    Raises:
+        InputError: the scene is wrong, or has no such source.
+    """
+    from grimaldi.outlines.extract import outline as extract
+    from grimaldi.scene import load
+    from grimaldi.scene.sources import pick_source
+
+    loaded = load(scene)
+    return extract(loaded, source if isinstance(source, Source) else pick_source(loaded, source), sag=sag)

@@ -1,0 +1,116 @@
+"""From a scene and a source to the lit outlines of all its bodies, or of its planar holes or masks."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from grimaldi.outlines import disk, mesh, planar, sphere
+from grimaldi.outlines.candidate import Candidates, toward
+from grimaldi.outlines.lit import Stretches, lit_parts
+from grimaldi.outlines.model import Integers, Outline, Reals
+from grimaldi.scene.model import Body, Mesh, Scene, Source, Sphere
+
+LONGEST = 1 / 32  # of the outlines' extent: how finely X→P visibility is told along a straight edge
+DEFAULT_SAG = 1e-4  # of a curve's size, where no wavelength sets it
+
+
+def outline(scene: Scene, source: Source, *, sag: float | None = None) -> Outline:
+    """The lit outlines that `source` sees.
+
+    Args:
+        scene: a loaded scene.
+        source: one of its sources.
+        sag: how far the polygon of a smooth outline may lie from it [scene units]; 1e-4 of its size by default.
+
+    Returns:
+        All lit silhouettes over the full sphere of directions, also those in front of other lit parts
+        (THEORY 2); of planar holes and masks the whole loops. Empty where nothing stands in the light.
+    """
+    if scene.screen:
+        return _planar(scene, source, sag)
+    parts = [_silhouette(body, source, sag) for body in scene.bodies]
+    if not any(len(part.start) for part in parts):
+        return Outline.empty()
+    body = np.repeat(np.arange(len(parts)), [len(part.start) for part in parts])
+    edges = Candidates.concatenate(parts)
+    extent = float(np.linalg.norm(np.ptp(np.concatenate([edges.start, edges.end]), axis=0)))
+    lit = lit_parts(scene.bodies, source, edges, body, LONGEST * extent)
+    return _assemble(edges, body, lit, source, _sag(scene.bodies, sag))
+
+
+def _silhouette(body: Body, source: Source, sag: float | None) -> Candidates:
+    geometry = body.geometry
+    if isinstance(geometry, Mesh):
+        return mesh.silhouette(geometry, source)
+    if isinstance(geometry, Sphere):
+        return sphere.silhouette(geometry, source, sag or DEFAULT_SAG * geometry.radius)
+    return disk.silhouette(
+        geometry, source, sag or DEFAULT_SAG * float(np.linalg.norm(geometry.to_world[:3, :2]))
+    )
+
+
+def _sag(bodies: tuple[Body, ...], sag: float | None) -> float:
+    """The sag of the coarsest curve among the bodies."""
+    sizes = [
+        b.geometry.radius
+        if isinstance(b.geometry, Sphere)
+        else float(np.linalg.norm(b.geometry.to_world[:3, :2]))
+        for b in bodies
+        if not isinstance(b.geometry, Mesh)
+    ]
+    if not sizes:
+        return 0.0
+    return sag or DEFAULT_SAG * max(sizes)
+
+
+def _planar(scene: Scene, source: Source, sag: float | None) -> Outline:
+    parts, number = [], []
+    for i, shape in enumerate(scene.screen):
+        size = float(np.linalg.norm(shape.to_world[:3, :2]))
+        for loop in planar.loops(shape, source, sag or DEFAULT_SAG * size):
+            parts.append(loop)
+            number.append(np.full(len(loop.start), -1 - i))
+    edges = Candidates.concatenate(parts)
+    return _assemble(edges, np.concatenate(number), Stretches.whole(len(edges.start)), source, sag or 0.0)
+
+
+def _assemble(edges: Candidates, body: Integers, lit: Stretches, source: Source, sag: float) -> Outline:
+    """The lit stretches in the order of their chains."""
+    c = lit.candidate
+    span = edges.end[c] - edges.start[c]
+    start = np.where((lit.low > 0)[:, None], edges.start[c] + lit.low[:, None] * span, edges.start[c])
+    end = np.where((lit.high < 1)[:, None], edges.start[c] + lit.high[:, None] * span, edges.end[c])
+    order, chain = _chains(start, end)
+    start, end, c = start[order], end[order], c[order]
+    interval = np.stack([lit.low, lit.high], axis=1)[order]
+    ray = -toward(source, 0.5 * (start + end))
+    out = np.cross(end - start, ray)
+    size = np.linalg.norm(out, axis=1, keepdims=True)
+    hole = (body[c] < 0)[:, None]  # a hole's open side is the one its loop encloses
+    outward = np.where(hole, -out, out) / np.maximum(size, 1e-300)
+    return Outline(start, end, body[c], edges.edge[c], interval, edges.normals[c], outward, chain, sag)
+
+
+def _chains(start: Reals, end: Reals) -> tuple[Integers, Integers]:
+    """An order in which segments follow each other end to start, and the chain that each then belongs to."""
+    n = len(start)
+    starting: dict[bytes, list[int]] = {}
+    for i in range(n - 1, -1, -1):
+        starting.setdefault(start[i].tobytes(), []).append(i)
+    ends = {point.tobytes() for point in end}
+    # open chains first, from where nothing arrives
+    seeds = [i for i in range(n) if start[i].tobytes() not in ends]
+    used = np.zeros(n, bool)
+    order, chain, number = [], [], 0
+    for seed in [*seeds, *range(n)]:
+        if used[seed]:
+            continue
+        i: int | None = seed
+        while i is not None:
+            used[i] = True
+            order.append(i)
+            chain.append(number)
+            following = starting.get(end[i].tobytes(), [])
+            i = next((j for j in following if not used[j]), None)
+        number += 1
+    return np.array(order, np.int64), np.array(chain, np.int64)

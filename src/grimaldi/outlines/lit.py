@@ -1,0 +1,163 @@
+"""The parts of candidate edges that the source reaches."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from grimaldi.outlines.candidate import Candidates, toward
+from grimaldi.outlines.hidden import WIDE, Queries, hidden, overlaps, view
+from grimaldi.outlines.model import Integers, Reals
+from grimaldi.scene.model import Body, Source
+
+SAMPLES = (0.03, 0.5, 0.97)  # of each stretch between two crossings
+HALVINGS = 40
+
+
+@dataclass(frozen=True, eq=False)
+class Stretches:
+    """Intervals low..high (n,) of candidates."""
+
+    candidate: Integers
+    low: Reals
+    high: Reals
+
+    @staticmethod
+    def whole(n: int) -> Stretches:
+        """All of n candidates."""
+        return Stretches(np.arange(n), np.zeros(n), np.ones(n))
+
+    def __getitem__(self, which: NDArray[np.bool_] | Integers) -> Stretches:
+        return Stretches(self.candidate[which], self.low[which], self.high[which])
+
+
+def lit_parts(
+    bodies: tuple[Body, ...], source: Source, edges: Candidates, body: Integers, longest: float
+) -> Stretches:
+    """What the source reaches of the candidates, in order along them.
+
+    body (n,): whose edges they are. Whether the source reaches an edge changes only where it passes behind another
+    outline (found exactly, by the signs of determinants) or runs into a surface (by bisection between samples).
+    No stretch comes out longer than `longest`.
+    """
+    all_ = _between_cuts(len(edges.start), *_crossings(source, edges))
+
+    def reached(stretches: Stretches, at: Reals) -> NDArray[np.bool_]:
+        c = stretches.candidate
+        x = edges.start[c] + at[:, None] * (edges.end[c] - edges.start[c])
+        return ~hidden(bodies, source, Queries(x, body[c], edges.faces[c]))
+
+    parts = []
+    places = [all_.low + f * (all_.high - all_.low) for f in SAMPLES]
+    states = [reached(all_, at) for at in places]
+    borders = [all_.low]
+    for i in range(len(SAMPLES) - 1):
+        change = states[i] != states[i + 1]
+        border = np.where(change, np.nan, places[i])
+        border[change] = _bisect(
+            lambda at, of=all_[change]: reached(of, at),
+            places[i][change],
+            places[i + 1][change],
+            states[i][change],
+        )
+        borders.append(border)
+    borders.append(all_.high)
+    for i, state in enumerate(states):
+        parts.append(Stretches(all_.candidate, borders[i], borders[i + 1])[state])
+    joined = _joined(
+        Stretches(*(np.concatenate([getattr(p, f) for p in parts]) for f in ("candidate", "low", "high")))
+    )
+    return _divided(joined, edges, longest)
+
+
+def _crossings(source: Source, edges: Candidates) -> tuple[Integers, Reals]:
+    """Where edges pass behind others in the source's view: the farther edge and its parameter there."""
+    a, b = view(source, edges.start), view(source, edges.end)
+    centres, radii = 0.5 * (a + b), 0.5 * np.linalg.norm(b - a, axis=1)
+    scale = 1.0 if not source.is_plane else max(float(np.ptp(centres, axis=0).max()), 1e-300)
+    wide = WIDE * scale
+    radii = radii * (1 + radii / scale) + 1e-12 * scale
+    widest = float(radii[radii <= wide].max(initial=0.0))
+    i, j = overlaps(centres, radii, centres, widest, wide)
+    i, j = np.concatenate([i, j]), np.concatenate([j, i])  # a wide edge finds the narrow ones, not they it
+    shared = (edges.start[i] == edges.end[j]).all(1) | (edges.end[i] == edges.start[j]).all(1)
+    keep = (i != j) & ~shared
+    pairs = np.unique(np.stack([i[keep], j[keep]], axis=1), axis=0)
+    i, j = pairs[:, 0], pairs[:, 1]
+    # i is cut by the plane through the source and j, and the other way round
+    t, across_i = _cut(source, edges, i, j)
+    s, across_j = _cut(source, edges, j, i)
+    x = edges.start[i] + t[:, None] * (edges.end[i] - edges.start[i])
+    y = edges.start[j] + s[:, None] * (edges.end[j] - edges.start[j])
+    w = toward(source, x)
+    ahead = np.einsum("ij,ij->i", y - x, w) / np.maximum(np.einsum("ij,ij->i", w, w), 1e-300)
+    if source.is_plane:
+        nearer = ahead > 0
+    else:
+        nearer = (ahead > 0) & (ahead < 1)  # on the same side of the source, and closer to it
+    keep = across_i & across_j & nearer
+    return i[keep], t[keep]
+
+
+def _cut(source: Source, edges: Candidates, i: Integers, j: Integers) -> tuple[Reals, NDArray[np.bool_]]:
+    """Where edges i meet the planes through the source and edges j: the parameter, and whether they do."""
+    if source.position is not None:
+        a = edges.start[j] - source.position
+        normal = np.cross(a, edges.end[j] - source.position)
+    else:
+        assert source.direction is not None
+        a = edges.start[j]
+        normal = np.cross(edges.end[j] - a, source.direction)
+    origin = edges.start[j]
+    low = np.einsum("ij,ij->i", edges.start[i] - origin, normal)
+    high = np.einsum("ij,ij->i", edges.end[i] - origin, normal)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.nan_to_num(low / (low - high)), (low > 0) != (high > 0)
+
+
+def _between_cuts(n: int, owner: Integers, at: Reals) -> Stretches:
+    """The stretches of n candidates between cuts at parameters `at` of candidates `owner`."""
+    candidate = np.concatenate([np.arange(n), owner])
+    low = np.concatenate([np.zeros(n), np.clip(at, 0, 1)])
+    order = np.lexsort((low, candidate))
+    candidate, low = candidate[order], low[order]
+    last = np.append(candidate[1:] != candidate[:-1], True)
+    high = np.where(last, 1.0, np.append(low[1:], 1.0))
+    return Stretches(candidate, low, high)[high > low]
+
+
+def _bisect(reached, low: Reals, high: Reals, at_low: NDArray[np.bool_]) -> Reals:
+    """Where `reached` changes between parameters low and high."""
+    for _ in range(HALVINGS if len(low) else 0):
+        middle = 0.5 * (low + high)
+        same = reached(middle) == at_low
+        low, high = np.where(same, middle, low), np.where(same, high, middle)
+    return 0.5 * (low + high)
+
+
+def _joined(parts: Stretches) -> Stretches:
+    """Stretches that continue each other made one."""
+    order = np.lexsort((parts.low, parts.candidate))
+    parts = parts[order]
+    if not len(order):
+        return parts
+    follows = (parts.candidate[1:] == parts.candidate[:-1]) & (parts.low[1:] == parts.high[:-1])
+    first = np.flatnonzero(np.append(True, ~follows))
+    last = np.append(first[1:], len(order)) - 1
+    return Stretches(parts.candidate[first], parts.low[first], parts.high[last])
+
+
+def _divided(parts: Stretches, edges: Candidates, longest: float) -> Stretches:
+    """Stretches cut evenly so that none is longer than `longest`."""
+    length = np.linalg.norm(edges.end - edges.start, axis=1)[parts.candidate] * (parts.high - parts.low)
+    pieces = np.maximum(np.ceil(length / longest), 1).astype(np.int64)
+    which = np.repeat(np.arange(len(pieces)), pieces)
+    step = np.arange(len(which)) - np.repeat(np.cumsum(pieces) - pieces, pieces)
+    span = (parts.high - parts.low)[which] / pieces[which]
+    low = parts.low[which] + step * span
+    high = np.where(step + 1 == pieces[which], parts.high[which], low + span)
+    # neighbours share their end bit for bit
+    low[1:] = np.where(which[1:] == which[:-1], high[:-1], low[1:])
+    return Stretches(parts.candidate[which], low, high)

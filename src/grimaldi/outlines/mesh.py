@@ -1,0 +1,84 @@
+"""Silhouette and border edges of a triangle mesh as a source sees them.
+
+An edge bounds the light exactly where all its triangles lie on one side of it in the source's view: so borders of
+open meshes count, edges between coplanar faces do not, and neither winding nor the number of triangles at an edge
+matters. Each triangle's side is decided once, by one determinant: the edges of a closed mesh form closed loops.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from grimaldi.outlines.candidate import Candidates, facing
+from grimaldi.outlines.model import Integers, Reals
+from grimaldi.scene.model import Mesh, Source
+
+
+def weld(mesh: Mesh) -> tuple[Reals, Integers]:
+    """Vertices merged by position (n, 3), and faces (m, 3) among them; faces without three corners keep no edge."""
+    points = np.ascontiguousarray(mesh.vertices + 0.0)  # -0.0 becomes 0.0
+    keys = points.view(np.dtype((np.void, points.itemsize * 3))).ravel()
+    _, first, inverse = np.unique(keys, return_index=True, return_inverse=True)
+    return points[first], inverse[mesh.faces]
+
+
+def sides(source: Source, corners: Reals) -> Integers:
+    """±1: whether triangles (m, 3, 3) turn counter-clockwise along the rays of the source; edge-on ones count as +1."""
+    if source.position is not None:
+        a, b, c = np.moveaxis(corners - source.position, 1, 0)
+        turn = np.einsum("ij,ij->i", np.cross(a, b), c)
+    else:
+        a, b, c = np.moveaxis(corners, 1, 0)
+        turn = np.cross(b - a, c - a) @ source.direction
+    return np.where(turn < 0, -1, 1)
+
+
+def silhouette(mesh: Mesh, source: Source) -> Candidates:
+    """All edges of the mesh that bound its light: folds, and borders of open meshes.
+
+    The first normal of a fold is that of the face towards the source, turned to it; the second one's face lies
+    behind and its normal points away, so that the body is behind both. A border has one normal.
+    """
+    points, faces = weld(mesh)
+    whole = (faces != np.roll(faces, 1, axis=1)).all(axis=1)
+    index, faces = np.flatnonzero(whole), faces[whole]
+    side = sides(source, points[faces])
+
+    tail, head = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
+    forward = tail < head
+    key = np.where(forward, tail, head) * len(points) + np.where(forward, head, tail)
+    order = np.argsort(key, kind="stable")
+    _, first, count = np.unique(key[order], return_index=True, return_counts=True)
+    turn = np.where(forward, 1, -1) * np.repeat(side, 3)
+    total = np.add.reduceat(turn[order], first) if len(first) else first
+    bounds = np.flatnonzero(np.abs(total) == count)
+
+    corner = order[first[bounds]]
+    along = turn[corner] > 0
+    low, high = np.where(forward, tail, head)[corner], np.where(forward, head, tail)[corner]
+    start, end = points[np.where(along, low, high)], points[np.where(along, high, low)]
+    two = count[bounds] == 2
+    face1 = corner // 3
+    face2 = np.where(two, order[np.minimum(first[bounds] + 1, len(order) - 1)] // 3, -1)
+    normals, swap = _normals(points, faces, source, start, face1, face2)
+    face1, face2 = np.where(swap, face2, face1), np.where(swap, face1, face2)
+    beside = np.stack([index[face1], np.where(two, index[face2], -1)], axis=1)
+    return Candidates(start, end, normals, bounds, beside)
+
+
+def _normals(
+    points: Reals, faces: Integers, source: Source, x: Reals, face1: Integers, face2: Integers
+) -> tuple[Reals, np.ndarray]:
+    """Normals (n, 2, 3) beside edges at x, the face towards the source first, and where face2 is that one."""
+    corners = points[faces]
+    area = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    unit = area / np.maximum(np.linalg.norm(area, axis=1, keepdims=True), 1e-300)
+    n1, n2 = facing(source, unit[face1], x), facing(source, unit[face2], x)
+    two = face2 >= 0
+    # face2 is in front where it bulges out of the plane of face1 towards the source
+    bulge = np.einsum("ij,ikj->ik", n1, corners[face2] - x[:, None])
+    furthest = np.take_along_axis(bulge, np.abs(bulge).argmax(axis=1)[:, None], axis=1)[:, 0]
+    swap = two & (furthest > 0)
+    lit = np.where(swap[:, None], n2, n1)
+    dark = np.where(two[:, None], -np.where(swap[:, None], n1, n2), 0.0)
+    return np.stack([lit, dark], axis=1), swap

@@ -1,0 +1,108 @@
+"""The whole method on one screen: scene → sources → outlines → boundary integral → U at points → coherence."""
+
+from __future__ import annotations
+
+from inspect import signature
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from grimaldi.errors import InputError
+from grimaldi.options import checked_options, describe
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+def field(
+    scene: Any,
+    points: ArrayLike,
+    *,
+    wavelength: Any,
+    scene_unit: str | None = None,
+    diffraction: str = "boundary",
+    interference: bool = True,
+    tolerance: float = 1e-3,
+    precision: Literal["auto", "double"] = "auto",
+    occlusion: bool = True,
+    **unknown: Any,
+) -> xr.Dataset:
+    """The complex field of a scene's sources at points.
+
+    Args:
+        scene: path, dict, `mi.Scene`, name of a built-in scene, or what `grimaldi.load` returned.
+        points: (n, 3) float64, in scene units. A point on a surface is taken on the side that the source is on.
+        wavelength: one or several, > 0; numbers in scene units, or text with units ("532 nm", "450 nm, 550 nm").
+        scene_unit: length of one scene unit, such as "1 um"; needed where the wavelength has a unit.
+        diffraction: "boundary" (THEORY eq. 4-6) or "none" (shadow rays).
+        interference: whether sources of one coherence group add their fields; if not, each is its own group.
+        tolerance: |M_computed - M| allowed for each source and point, where U = U0 M: the error of integrating the
+            stated model, not of the model.
+        precision: "auto" (Float32 sums where the tolerance allows), or "double".
+        occlusion: whether bodies block the way from an outline to a point.
+
+    Returns:
+        Dataset with `U` complex128 (wavelength, group, point) by eq. 1-2 and 4-6, `intensity` float64 (point) by
+        eq. 3, `error` float64 (wavelength, group, point), the estimated |U_computed - U|, and coordinates x, y, z.
+
+    Raises:
+        InputError: one line naming what is wrong and what to do.
+    """
+    import xarray as xr
+
+    from grimaldi.coherence import groups, intensity, separated
+    from grimaldi.conventions import check_options, parse_wavelengths
+    from grimaldi.diffraction import model
+    from grimaldi.engine.points import at_points
+    from grimaldi.engine.progress import progress
+    from grimaldi.propagate import propagate
+    from grimaldi.scene import load
+    from grimaldi.scene.checking import require_sources
+
+    check_options(unknown, signature(field).parameters)
+    p = checked_points(points)
+    options = checked_options(tolerance, precision, occlusion)
+    factor = model(diffraction)
+    loaded = load(scene, scene_unit=scene_unit)
+    wavelengths = parse_wavelengths(wavelength, loaded.unit)
+    require_sources(loaded)
+    sources = loaded.sources if interference else separated(loaded.sources)
+
+    names = groups(sources)
+    U = np.zeros((len(wavelengths), len(names), len(p)), complex)
+    error = np.zeros(U.shape)
+    with progress(len(wavelengths) * len(sources) * len(p), "field") as advance:
+        for i, length in enumerate(wavelengths):
+            for source in sources:
+                wave = propagate(loaded, source, factor, 2 * np.pi / length, options)
+                of = i, names.index(source.group)
+                for block, u, du in at_points(wave, loaded, source, p):
+                    U[*of, block] += u
+                    error[*of, block] += du
+                    advance(len(u))
+    data = {
+        "U": (("wavelength", "group", "point"), U),
+        "intensity": ("point", intensity(U)),
+        "error": (("wavelength", "group", "point"), error),
+    }
+    coords = {"wavelength": list(wavelengths), "group": list(names)}
+    coords |= {axis: ("point", p[:, i]) for i, axis in enumerate("xyz")}
+    attrs = describe(loaded, diffraction=diffraction, interference=interference, options=options)
+    return xr.Dataset(data, coords, attrs)
+
+
+def checked_points(points: ArrayLike) -> NDArray[np.float64]:
+    """Points as (n, 3) float64; InputError where they are not that, or not finite."""
+    try:
+        p = np.array(points, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InputError("points: not numbers; give an array of shape (n, 3)") from None
+    if p.shape == (3,):
+        p = p[None]
+    if p.ndim != 2 or p.shape[1] != 3:
+        raise InputError(f"points: shape {p.shape} is not (n, 3); give one x, y, z to a row")
+    if not np.isfinite(p).all():
+        row = int(np.flatnonzero(~np.isfinite(p).all(axis=1))[0])
+        raise InputError(f"points: row {row} is not finite; give numbers")
+    return p
