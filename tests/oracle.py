@@ -108,9 +108,8 @@ def arc_edge(to_world: ArrayLike, start: float, end: float, n: int = 20_000) -> 
 
 def curve_edge(curve: Callable[[Reals], tuple[Reals, Reals]], start: float, end: float, n: int) -> Nodes:
     """Midpoint rule along t -> (X, X') from `start` to `end`: spectrally accurate on closed curves."""
-    step = (end - start) / n
-    x, tangent = curve(start + step * (np.arange(n) + 0.5))
-    return Nodes(x, tangent * step)
+    x, tangent = curve(np.linspace(start, end, 2 * n + 1)[1::2])
+    return Nodes(x, tangent * (end - start) / n)
 
 
 def polygon_edge(loop: ArrayLike, pieces: int = 400, order: int = 12) -> Nodes:
@@ -151,6 +150,28 @@ def edge_factor(source: Source, points: ArrayLike, outline: Nodes, wavelength: f
     Loops run either way: M is taken positive where the ray passes. The ray's line must cross the
     opening between source and receiver, if it does.
     """
+    everywhere = np.ones((len(np.atleast_2d(points)), len(outline.x)), bool)
+    return _boundary(source, points, outline, wavelength, 1.0, everywhere)
+
+
+def edge_wave(
+    source: Source, points: ArrayLike, outline: Nodes, wavelength: float, visible: NDArray[np.bool_]
+) -> Factors:
+    """(m,) (1/2π) ∫ C e^{ikΔ} dφ over the nodes that `visible` (m, nodes) marks: eq. 5 is 1 - n plus this.
+
+    Accurate wherever the ray passes no edge closely.
+    """
+    return -_boundary(source, points, outline, wavelength, 0.0, visible)
+
+
+def _boundary(
+    source: Source,
+    points: ArrayLike,
+    outline: Nodes,
+    wavelength: float,
+    geometric: float,
+    visible: NDArray[np.bool_],
+) -> Factors:
     k = 2 * np.pi / wavelength
     receivers = np.atleast_2d(np.asarray(points, float))
     result = np.empty(len(receivers), complex)
@@ -171,7 +192,8 @@ def edge_factor(source: Source, points: ArrayLike, outline: Nodes, wavelength: f
         detour = _excess(z1, d2) + _excess(z2, d2)
         c = 0.5 * (1 + _cosine(z1, z2, d2))
         azimuth = np.cross(q, outline.w) @ a / d2
-        result[i] = ((1 - c * np.exp(1j * k * detour)) * azimuth).sum() / (2 * np.pi)
+        integrand = (geometric - c * np.exp(1j * k * detour)) * azimuth
+        result[i] = integrand[visible[i]].sum() / (2 * np.pi)
     # A loop's sense is a convention: it follows its own area vector, seen along the ray.
     side = np.sign(
         np.cross(outline.x - outline.x.mean(axis=0), outline.w).sum(axis=0) @ _axis(source, outline)
