@@ -14,10 +14,14 @@ from grimaldi.errors import GrimaldiWarning, InputError
 from grimaldi.scene.bodies import faces_inward
 from grimaldi.scene.messages import where
 from grimaldi.scene.model import Body, Mesh, Scene, Sphere
-from grimaldi.scene.ply import check_ply, check_positions
+from grimaldi.scene.ply import check_ply
 from grimaldi.scene.screen import check_screen
+from grimaldi.scene.serialized import check_serialized
+from grimaldi.scene.triangles import LARGEST, check_positions, check_triangles
 
 Reals = NDArray[np.float64]
+
+LARGEST_FILM = 2**28  # pixels; far beyond it Mitsuba counts wrongly, and says nothing
 
 
 def require_sources(scene: Scene) -> None:
@@ -36,7 +40,7 @@ def require_sensor(scene: Scene) -> None:
 
 
 def check_nodes(state: Any) -> None:
-    """Checks a parsed scene (`mi.parser.ParserState`) before Mitsuba builds it: PLY files, spheres' radii.
+    """Checks a parsed scene (`mi.parser.ParserState`) before Mitsuba builds it: mesh files, radii, film size.
 
     Raises:
         InputError: naming the file and line.
@@ -47,13 +51,20 @@ def check_nodes(state: Any) -> None:
     for node in state.nodes:
         plugin, props = node.props.plugin_name(), node.props
         place = where(mi.parser.file_location(state, node))
-        if plugin == "ply" and isinstance(name := props.get("filename", None), str):
+        if plugin in ("ply", "serialized") and isinstance(name := props.get("filename", None), str):
             file = Path(str(resolver.resolve(name)))
             if not file.is_file():
                 raise InputError(f"{place}: file {name!r} not found; name it relative to the scene's folder")
-            check_ply(file)
+            if plugin == "ply":
+                check_ply(file)
+            else:
+                check_serialized(file, int(props.get("shape_index", 0)))
         elif plugin == "sphere" and isinstance(radius := props.get("radius", None), (int, float)):
             _check_radius(radius, place)
+        elif plugin == "hdrfilm":
+            width, height = props.get("width", 768), props.get("height", 576)
+            if not 0 < width * height <= LARGEST_FILM:
+                raise InputError(f"{place}: a film of {width} × {height} pixels; give at most 2^28 in all")
 
 
 def check_scene(scene: Scene) -> None:
@@ -84,11 +95,9 @@ def _check_body(body: Body) -> None:
         _check_radius(geometry.radius, body.name)
         check_positions(geometry.centre[None], body.name)
     elif isinstance(geometry, Mesh):
-        if not len(geometry.faces):
-            raise InputError(f"{body.name}: the mesh is empty; give it at least one triangle")
-        check_positions(geometry.vertices, body.name)
+        check_triangles(geometry.vertices, geometry.faces, body.name)
         _warn_of_shared_edges(geometry, body.name)
-    elif not (np.abs(geometry.to_world) < 1e30).all():
+    elif not (np.abs(geometry.to_world) < LARGEST).all():
         raise InputError(f"{body.name}: to_world is not finite; give finite numbers below 1e30")
 
 

@@ -53,7 +53,8 @@ def load(scene: Any, *, outlines: Iterable[PlanarOutline] = (), scene_unit: str 
         masks=(*loaded.masks, *(outline for outline in added if not outline.hole)),
         unit=loaded.unit if scene_unit is None else scene_unit,
     )
-    check_scene(loaded)
+    with _in_scene(loaded.name):
+        check_scene(loaded)
     return loaded
 
 
@@ -74,10 +75,10 @@ def _read(scene: Any) -> Scene:
     ensure_variant("mono")
     name, mi_scene, unit = _open(scene)
     if not isinstance(mi_scene, mi.Scene):
-        raise InputError(
-            f"{name}: is a {type(mi_scene).__name__}, no scene of variant {mi.variant()}; give a scene"
-        )
-    shapes = sort_shapes(mi_scene.shapes())
+        raise InputError(f"{name}: is a {type(mi_scene).__name__}, no scene of variant {mi.variant()}; give a scene")
+    with _in_scene(name):
+        shapes = sort_shapes(mi_scene.shapes())
+        found = sources(mi_scene)
     if shapes.others:
         warnings.warn(f"{', '.join(shapes.others)}: does not diffract yet", GrimaldiWarning, stacklevel=3)
     return Scene(
@@ -85,7 +86,7 @@ def _read(scene: Any) -> Scene:
         mitsuba=mi_scene,
         blockers=blockers(mi_scene, shapes.bodies),
         bodies=shapes.bodies,
-        sources=sources(mi_scene),
+        sources=found,
         holes=shapes.holes,
         unit=unit,
     )
@@ -99,7 +100,7 @@ def _open(scene: Any) -> tuple[str, Any, str | None]:
         return "scene", scene, None
     path = Path(scene)
     if path.is_file():
-        return path.stem, *_from_file(path)
+        return path.name, *_from_file(path)
     return str(scene), *_from_dict(_builtin(str(scene)))
 
 
@@ -179,6 +180,15 @@ def _searching(folder: Path) -> Iterator[None]:
         yield
     finally:
         mi.set_file_resolver(before)
+
+
+@contextmanager
+def _in_scene(name: str) -> Iterator[None]:
+    """Puts the scene's name before what is wrong with one of its parts."""
+    try:
+        yield
+    except InputError as error:
+        raise type(error)(f"{name}: {error}") from error
 
 
 @contextmanager

@@ -5,9 +5,10 @@ from __future__ import annotations
 import re
 from difflib import get_close_matches
 from functools import cache
-from importlib import resources
+from pathlib import Path
 
 _SOURCE_LINE = re.compile(r"\[[\w.]+\.(?:cpp|h|inl):\d+\]\s*")
+_CLASS = re.compile(r"\[[A-Z]\w+\] ")
 _PLACE = re.compile(
     r"(?:Error while loading|While loading|At) "
     r'(?P<place>dictionary node "[^"]*"|[^\n]*? \(line \d+, col \d+\))(?:,|:) (?P<rest>.*)',
@@ -21,11 +22,10 @@ _UNREFERENCED = re.compile(r"Found \d+ unreferenced propert\w+ in (?P<plugin>.*?
 _PROPERTY = re.compile(r'- \w+ "(?P<name>[^"]*)"')
 _MISSING_PROPERTY = re.compile(r'Property "(?P<name>[^"]*)" cannot be found')
 _MISSING_FILE = re.compile(
-    r'file "(?P<name>[^"]*)": file not found|included file "(?P<include>[^"]*)" not found'
+    r'file "(?P<mesh>[^"]*)": file not found|included file "(?P<include>[^"]*)" not found'
+    r'|"(?P<other>[^"]*)": I/O error while attempting to open file: No such file'
 )
-_INSTANTIATE = re.compile(
-    r'failed to instantiate (?P<kind>\w+(?: plugin)?) (?:plugin )?of type "(?P<type>[^"]*)": '
-)
+_INSTANTIATE = re.compile(r'failed to instantiate (?P<kind>\w+(?: plugin)?) (?:plugin )?of type "(?P<type>[^"]*)": ')
 _OWN_ERROR = re.compile(r"^(?:[\w.]*\.)?(?:InputError|NotYet): (?P<message>.*)\Z", re.MULTILINE | re.DOTALL)
 _NO_TRIANGLES = ("Storing new normals in a Mesh", "operands have incompatible sizes")
 
@@ -59,10 +59,12 @@ def _what(text: str) -> str:
     if match := _MISSING_PROPERTY.search(text):
         return f"parameter {match['name']!r}{of} is missing; give it"
     if match := _MISSING_FILE.search(text):
-        return f"file {match['name'] or match['include']!r} not found; name it relative to the scene's folder"
+        name = match["mesh"] or match["include"] or match["other"]
+        return f"file {name!r} not found; name it relative to the scene's folder"
     if any(sign in text for sign in _NO_TRIANGLES):
         return f"the mesh{of} is empty; give it at least one triangle"
-    return _INSTANTIATE.sub(lambda match: f"{match['type']!r}: ", text)
+    said = _CLASS.sub("", _INSTANTIATE.sub(lambda match: f"{match['type']!r}: ", text)).rstrip(" .!")
+    return f"{said}; correct it there"
 
 
 def _nearest(name: str) -> str:
@@ -73,6 +75,10 @@ def _nearest(name: str) -> str:
 @cache
 def _plugin_names() -> tuple[str, ...]:
     """Mitsuba's plugins, one shared library each, and Grimaldi's, one module each."""
-    folders = resources.files("mitsuba") / "plugins", resources.files("grimaldi.plugins")
-    names = {file.name.partition(".")[0] for folder in folders for file in folder.iterdir()}
-    return tuple(sorted(names - {"parameters", "__init__", "__pycache__"}))
+    import mitsuba as mi
+
+    import grimaldi.plugins
+
+    libraries = (Path(str(mi.__file__)).parent / "plugins").iterdir()
+    own = Path(str(grimaldi.plugins.__file__)).parent.glob("[!_]*.py")
+    return tuple(sorted({file.name.partition(".")[0] for file in (*libraries, *own)} - {"parameters"}))

@@ -84,9 +84,7 @@ def _affine(matrix: Any, place: str) -> Reals:
     except (TypeError, ValueError):
         matrix = np.empty(0)
     if matrix.shape != (4, 4) or not np.isfinite(matrix).all() or (matrix[3] != (0, 0, 0, 1)).any():
-        raise InputError(
-            f"{place}: to_world is no affine map; give a finite (4, 4) matrix ending in 0, 0, 0, 1"
-        )
+        raise InputError(f"{place}: to_world is no affine map; give a finite (4, 4) matrix ending in 0, 0, 0, 1")
     x, y = matrix[:3, 0], matrix[:3, 1]
     if np.linalg.norm(np.cross(x, y)) <= 1e-12 * np.linalg.norm(x) * np.linalg.norm(y):
         raise InputError(f"{place}: to_world is singular; its x and y axes must span a plane")

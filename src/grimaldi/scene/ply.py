@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from grimaldi.errors import InputError
-
-LARGEST = 1e30  # beyond it Float32 geometry overflows when squared
+from grimaldi.scene.triangles import check_triangles
 
 _ANEW = "export the mesh anew"
 _TYPES = {
@@ -39,30 +38,22 @@ def check_ply(path: Path) -> None:
     tokens = [] if order else data[at:].split()
     if not order:
         at = 0
-    vertices: int | None = None
+    rows: dict[str, NDArray[np.void]] = {}
     for element in elements:
         dtype = _row(element, order or "=", path)
         if order:
-            rows = _binary_rows(data, at, element.count, dtype)
-            at += rows.nbytes
+            read = _binary_rows(data, at, element.count, dtype)
+            at += read.nbytes
         else:
-            rows, at = _ascii_rows(tokens, at, element, dtype, path)
-        _check_whole(rows, element, path)
-        if element.name == "vertex":
-            vertices = element.count
-            _check_vertices(rows, path)
-        elif element.name == "face":
-            _check_faces(rows, vertices, path)
-
-
-def check_positions(positions: NDArray[np.floating], place: str) -> None:
-    """Raises InputError naming the first of the (n, 3) positions that is not finite, or beyond 1e30."""
-    # Negated, so that NaN counts as bad.
-    bad = ~(np.abs(positions) < LARGEST).all(axis=1)
-    if bad.any():
-        i = int(np.flatnonzero(bad)[0])
-        coordinates = ", ".join(f"{x:g}" for x in positions[i])
-        raise InputError(f"{place}: vertex {i} is at ({coordinates}); give finite coordinates below 1e30")
+            read, at = _ascii_rows(tokens, at, element, dtype, path)
+        _check_whole(read, element, path)
+        rows[element.name] = read
+    if not {"x", "y", "z"} <= set(rows["vertex"].dtype.names or ()):
+        raise InputError(f"{path}: vertices have no x, y, z; {_ANEW}")
+    if "vertices" not in (rows["face"].dtype.names or ()):
+        raise InputError(f"{path}: faces have no vertex_indices; {_ANEW}")
+    positions = np.stack([rows["vertex"][axis] for axis in "xyz"], axis=1)
+    check_triangles(positions, rows["face"]["vertices"], str(path))
 
 
 def _header(data: bytes, path: Path) -> tuple[str, list[_Element], int]:
@@ -86,9 +77,7 @@ def _header(data: bytes, path: Path) -> tuple[str, list[_Element], int]:
                 case ["property", kind, name]:
                     elements[-1].properties.append((name, _TYPES[kind], None))
         except (KeyError, ValueError, IndexError):
-            raise InputError(
-                f"{path}, line {number}: {line.strip()!r} is no PLY header line; {_ANEW}"
-            ) from None
+            raise InputError(f"{path}, line {number}: {line.strip()!r} is no PLY header line; {_ANEW}") from None
     if order is None:
         raise InputError(f"{path}: the PLY header names no format; {_ANEW}")
     counts = {element.name: element.count for element in elements}
@@ -106,9 +95,7 @@ def _row(element: _Element, order: str, path: Path) -> np.dtype[np.void]:
         elif element.name == "face" and name in ("vertex_indices", "vertex_index"):
             fields += [("corners", order + length), ("vertices", order + kind, (3,))]
         else:
-            raise InputError(
-                f"{path}: {element.name} has a list {name!r}, which Mitsuba cannot read; {_ANEW}"
-            )
+            raise InputError(f"{path}: {element.name} has a list {name!r}, which Mitsuba cannot read; {_ANEW}")
     if not fields:
         raise InputError(f"{path}: {element.name} has no properties; {_ANEW}")
     return np.dtype(fields)
@@ -145,21 +132,3 @@ def _check_whole(rows: NDArray[np.void], element: _Element, path: Path) -> None:
             f"{path}: is cut off: the header says {element.count} {element.name} rows, "
             f"the file holds {len(rows)}; copy or export it anew"
         )
-
-
-def _check_vertices(rows: NDArray[np.void], path: Path) -> None:
-    if not {"x", "y", "z"} <= set(rows.dtype.names or ()):
-        raise InputError(f"{path}: vertices have no x, y, z; {_ANEW}")
-    check_positions(np.stack([rows[axis] for axis in "xyz"], axis=1), str(path))
-
-
-def _check_faces(rows: NDArray[np.void], vertices: int | None, path: Path) -> None:
-    if "vertices" not in (rows.dtype.names or ()):
-        raise InputError(f"{path}: faces have no vertex_indices; {_ANEW}")
-    if vertices is None:
-        raise InputError(f"{path}: faces come before vertices; {_ANEW}")
-    bad = ((rows["vertices"] < 0) | (rows["vertices"] >= vertices)).any(axis=1)
-    if bad.any():
-        i = int(np.flatnonzero(bad)[0])
-        named = ", ".join(f"{int(v)}" for v in rows["vertices"][i])
-        raise InputError(f"{path}: face {i} joins vertices {named}, but there are {vertices}; {_ANEW}")

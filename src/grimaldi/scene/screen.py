@@ -29,9 +29,7 @@ def check_screen(scene: Scene) -> None:
     if not scene.holes:
         return
     if scene.masks:
-        raise NotYet(
-            "outlines: an opaque mask beside an aperture is not handled yet; cut it out as an island"
-        )
+        raise NotYet("outlines: an opaque mask beside an aperture is not handled yet; cut it out as an island")
     points = np.concatenate([loop for hole in scene.holes for loop in hole.world_loops()])
     origin, normal = scene.holes[0].origin, scene.holes[0].normal
     slack = FLAT * (np.ptp(points, axis=0).max() + np.abs(points).max())
@@ -48,9 +46,7 @@ def check_screen(scene: Scene) -> None:
         if high <= slack and low < -slack:
             far.append(body)
         elif low < -slack or high <= slack:
-            raise NotYet(
-                f"{body.name}: a body that meets the aperture screen is not handled yet; move it away"
-            )
+            raise NotYet(f"{body.name}: a body that meets the aperture screen is not handled yet; move it away")
         elif any(
             _may_hide(body.geometry, hole, source, normal)
             for hole, source in itertools.product(scene.holes, scene.sources)

@@ -62,22 +62,30 @@ def _kind(emitter: Any) -> str:
 
 def _source(emitter: Any, name: str, coherent: Collection[str]) -> Source:
     kind = _kind(emitter)
+    place: dict[str, Any]
     if kind == "coherent_point":
-        return Source(name, **_own(emitter), position=_numbers(emitter.position))
-    if kind == "coherent_directional":
-        return Source(name, **_own(emitter), direction=_unit(_numbers(emitter.direction)))
-    power = _power(emitter, name)
+        place = {"position": _numbers(emitter.position)}
+    elif kind == "coherent_directional":
+        place = {"direction": _unit(_numbers(emitter.direction))}
+    elif kind == "PointLight":
+        place = {"position": _numbers(_parameter(emitter, "position"))}
+    else:
+        to_world = _numbers(_parameter(emitter, "to_world").matrix).reshape(4, 4)
+        place = {"direction": _unit(to_world[:3, 2]), "origin": to_world[:3, 3].copy()}
+    for what, value in place.items():
+        if not np.isfinite(value).all():
+            raise InputError(f"{name}: {what} is not finite; give numbers, not all 0 in a direction")
+    if kind in ("PointLight", "DirectionalEmitter"):
+        wave = _from_power(_power(emitter, name), COHERENT_GROUP if name in coherent else name)
+    else:
+        wave = _own(emitter)
+    return Source(name, **wave, **place)
+
+
+def _from_power(power: NDArray[np.float64], group: str) -> dict[str, Any]:
     mean = float(power.mean())
-    common: dict[str, Any] = {
-        "group": COHERENT_GROUP if name in coherent else name,
-        "amplitude": float(np.sqrt(mean)),
-        "phase": 0.0,
-        "tint": tuple((power / mean).tolist()) if mean > 0 else (1.0,) * len(power),
-    }
-    if kind == "PointLight":
-        return Source(name, **common, position=_numbers(_parameter(emitter, "position")))
-    to_world = _numbers(_parameter(emitter, "to_world").matrix).reshape(4, 4)
-    return Source(name, **common, direction=_unit(to_world[:3, 2]), origin=to_world[:3, 3].copy())
+    tint = tuple((power / mean).tolist()) if mean > 0 else (1.0,) * len(power)
+    return {"group": group, "amplitude": float(np.sqrt(mean)), "phase": 0.0, "tint": tint}
 
 
 def _own(emitter: Any) -> dict[str, Any]:
@@ -135,9 +143,7 @@ def _check_variant() -> None:
     import mitsuba as mi
 
     if mi.is_spectral or mi.is_polarized:
-        raise InputError(
-            f"variant {mi.variant()}: waves are computed in mono and rgb variants; set 'llvm_ad_rgb', say"
-        )
+        raise InputError(f"variant {mi.variant()}: waves are computed in mono and rgb variants; set 'llvm_ad_rgb', say")
 
 
 def _unique_names(emitters: Iterable[Any]) -> list[str]:
@@ -159,9 +165,7 @@ def _check_ids(coherent: Collection[str], names: list[str]) -> None:
     for name in coherent:
         if name not in names:
             nearest = get_close_matches(name, names, n=1)
-            advice = (
-                f"did you mean {nearest[0]!r}?" if nearest else f"the scene has {', '.join(names) or 'none'}"
-            )
+            advice = f"did you mean {nearest[0]!r}?" if nearest else f"the scene has {', '.join(names) or 'none'}"
             raise InputError(f"coherent: no source has the id {name!r}; {advice}")
 
 
