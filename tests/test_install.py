@@ -94,6 +94,21 @@ mi.load_dict({"type": "aperture"})
 """)
 
 
+def test_hooks_on_the_same_module_all_run_once_and_leave_no_trace() -> None:
+    python("""
+import sys
+from grimaldi._import_hook import after_import
+finders = list(sys.meta_path)
+called = []
+after_import("colorsys", lambda: called.append("first"))
+after_import("colorsys", lambda: called.append("second"))
+import colorsys
+assert sorted(called) == ["first", "second"] and sys.meta_path == finders
+assert colorsys.__spec__.loader is colorsys.__loader__
+assert type(colorsys.__loader__).__name__ == "SourceFileLoader"
+""")
+
+
 def test_public_names_are_there_and_others_are_not() -> None:
     python("""
 import grimaldi, grimaldi.outlines, grimaldi.scene
