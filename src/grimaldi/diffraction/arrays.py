@@ -29,9 +29,7 @@ def types(double: bool) -> Types:
     """Float64 or Float32 arrays of the variant in use."""
     variant = mi.variant() or ""
     if variant.startswith("scalar"):
-        raise InputError(
-            f"variant {variant}: waves need an llvm or cuda variant; use llvm_ad_rgb or llvm_ad_mono"
-        )
+        raise InputError(f"variant {variant}: waves need an llvm or cuda variant; use llvm_ad_rgb or llvm_ad_mono")
     ad = dr.cuda.ad if variant.startswith("cuda") else dr.llvm.ad
     if double:
         return Types(ad.Float64, ad.Array3f64, ad.Array4f64)

@@ -67,18 +67,14 @@ def _planar(scene: Scene, source: Source, tab: Table, k: float, rule: Rule) -> E
         fr = frame(source, receivers.p, tab.centre, tab.types)
         sums, n = planar_sum(fr, tab, k, rule, shaded)
         m = _factor(tab, rule, n, -1, sums) if hole else _factor(tab, rule, 1 - n, 1, sums)
-        return Factor(
-            dr.select(shaded, m.real, 1), dr.select(shaded, m.imag, 0), dr.select(shaded, m.error, 0)
-        )
+        return Factor(dr.select(shaded, m.real, 1), dr.select(shaded, m.imag, 0), dr.select(shaded, m.error, 0))
 
     return evaluate
 
 
-def _bodies(
-    scene: Scene, source: Source, tab: Table, sag: float, k: float, rule: Rule, options: Options
-) -> Evaluate:
-    probe = rays(scene, source)
-    rim = 4 * probe.epsilon + sag
+def _bodies(scene: Scene, source: Source, tab: Table, sag: float, k: float, rule: Rule, options: Options) -> Evaluate:
+    probe = rays(scene, source, sag)
+    rim = 4 * probe.epsilon
 
     def evaluate(receivers: Receivers) -> Factor:
         fr = frame(source, receivers.p, tab.centre, tab.types)

@@ -140,7 +140,8 @@ def body_sum(
     F = tab.types.Float
     U = dr.uint32_array_t(F)
     n = tab.types.Vector(receivers.n)
-    p = mi.Point3f(receivers.p)
+    lift = 0.0 if probe is None else probe.epsilon
+    p = mi.Point3f(receivers.p) + lift * receivers.n  # off its own surface
     real, imag, err_real, err_imag = F(0), F(0), F(0), F(0)
     nearest2, nearest_segment, nearest_piece = F(dr.inf), U(0), U(0)
     i = U(0)

@@ -23,9 +23,7 @@ class Rays(NamedTuple):
     def clear(self, origin: Any, target: Any, active: Any) -> Any:
         """Whether nothing stands on origin→target."""
         d = target - origin
-        return ~self.blockers.ray_test(
-            mi.Ray3f(origin, d, 1 - self.epsilon / dr.norm(d), 0, mi.Color0f()), active
-        )
+        return ~self.blockers.ray_test(mi.Ray3f(origin, d, 1 - self.epsilon / dr.norm(d), 0, mi.Color0f()), active)
 
     def toward(self, p: Any) -> Any:
         """The unit direction from points to the source."""
@@ -45,8 +43,8 @@ class Rays(NamedTuple):
         """Whether the wave from x on an outline piece reaches p.
 
         A last stretch of p→x that runs inside the body ending at x does not block: a smooth body's own bulge
-        always stands there. Inside means behind both faces at x, and no surface between the first hit and x;
-        the border of a sheet has no inside.
+        always stands there. Inside means behind both faces at x, no surface between the first hit and x, and
+        not further than where the body's next lit part begins behind x; the border of a sheet has no inside.
         """
         d = x - p
         length = dr.norm(d)
@@ -55,6 +53,7 @@ class Rays(NamedTuple):
         hit = self.blockers.ray_intersect_preliminary(mi.Ray3f(p, d, end, 0, mi.Color0f()), active=active)
         blocked = hit.is_valid()
         inside = (piece.closed > 0.5) & (dr.dot(piece.lit, d) > 0) & (dr.dot(piece.dark, d) > 0)
+        inside &= end - hit.t < piece.behind
         if active & blocked & inside:
             start = hit.t + self.epsilon
             blocked = self.blockers.ray_test(
@@ -78,6 +77,6 @@ def extent(scene: Scene, source: Source) -> float:
     return reach
 
 
-def rays(scene: Scene, source: Source) -> Rays:
-    """Visibility rays for one source of a scene that has bodies."""
-    return Rays(scene.blockers, source, 4e-6 * extent(scene, source))
+def rays(scene: Scene, source: Source, sag: float = 0.0) -> Rays:
+    """Visibility rays for one source of a scene that has bodies, towards outlines that lie within `sag` of them."""
+    return Rays(scene.blockers, source, 4e-6 * extent(scene, source) + 2 * sag)

@@ -194,9 +194,7 @@ def _direct(frame: Frame, ln: Line, st: Stationary, lo: Any, hi: Any, k: float, 
             ev = dr.exp(dr.fma(dv, x_j, v0))
             inv = dr.rcp(ev)
             cosh = 0.5 * (ev + inv)
-            delta, C, _, _ = detour(
-                frame, ln, ln.td + 0.5 * ln.w * (ev - inv), ln.eqq * dr.square(ln.w * cosh)
-            )
+            delta, C, _, _ = detour(frame, ln, ln.td + 0.5 * ln.w * (ev - inv), ln.eqq * dr.square(ln.w * cosh))
             sin, cos = dr.sincos(k * delta)
             amplitude = w_j * dv * C / cosh
             real = dr.fma(amplitude, cos, real)

@@ -33,6 +33,7 @@ class Piece(NamedTuple):
     dark: Any
     closed: Any  # 1 where two faces meet, 0 at the border of a sheet
     outward: Any
+    behind: Any  # how far behind it its own body comes next
 
 
 class Table(NamedTuple):
@@ -64,15 +65,22 @@ class Table(NamedTuple):
             V(c.x, c.y, c.z),
             b.w,
             V(d.x, d.y, d.z),
+            d.w,
         )
 
 
-def cut(outline: Outline, longest: float) -> NDArray[np.int64]:
-    """First segments of the pieces, and the number of segments: runs of a chain no longer than `longest`."""
+def cut(outline: Outline) -> NDArray[np.int64]:
+    """First segments of the pieces, and the number of segments: runs of a chain, at most a 64th of a body's extent."""
+    extent = {b: np.linalg.norm(np.ptp(outline.start[outline.body == b], axis=0)) for b in np.unique(outline.body)}
     lengths = np.linalg.norm(outline.end - outline.start, axis=1)
     first, in_piece, total = [], 0, 0.0
     for i, (length, chain) in enumerate(zip(lengths, outline.chain, strict=True)):
-        if i == 0 or chain != outline.chain[i - 1] or in_piece == LONGEST_PIECE or total + length > longest:
+        if (
+            i == 0
+            or chain != outline.chain[i - 1]
+            or in_piece == LONGEST_PIECE
+            or total + length > extent[outline.body[i]] / 64
+        ):
             first.append(i)
             in_piece, total = 0, 0.0
         in_piece += 1
@@ -81,11 +89,11 @@ def cut(outline: Outline, longest: float) -> NDArray[np.int64]:
 
 
 def table(outline: Outline, types: Types) -> Table:
-    """Pack an outline; pieces are at most a 64th of its extent."""
+    """Pack an outline."""
     ends = np.concatenate([outline.start, outline.end])
     low, high = ends.min(0), ends.max(0)
     centre = 0.5 * (low + high)
-    ranges = cut(outline, float(np.linalg.norm(high - low)) / 64)
+    ranges = cut(outline)
     X0, X1 = outline.start - centre, outline.end - centre
     length = np.linalg.norm(X1 - X0, axis=1, keepdims=True)
     zero = np.zeros_like(length)
@@ -97,8 +105,9 @@ def table(outline: Outline, types: Types) -> Table:
     normals = outline.normals[middle]
     closed = (np.linalg.norm(normals[:, 1], axis=1) > 0).astype(float)[:, None]
     none = np.zeros_like(reach)
+    behind = np.minimum.reduceat(np.minimum(outline.behind, 1e30), ranges[:-1])[:, None]
     pieces = np.concatenate(
-        [target, reach, normals[:, 0], closed, normals[:, 1], none, outline.outward[middle], none], 1
+        [target, reach, normals[:, 0], closed, normals[:, 1], none, outline.outward[middle], behind], 1
     )
     index = dr.uint32_array_t(types.Float)
     return Table(

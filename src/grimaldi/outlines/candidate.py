@@ -19,9 +19,7 @@ class Candidates:
     end: Reals  # (n, 3)
     normals: Reals  # (n, 2, 3), as in `Outline`
     edge: Integers  # (n,) the mesh edge, -1 on smooth shapes
-    faces: (
-        Integers  # (n, 2) the body's triangles beside the edge: they cannot hide it; -1 where there is none
-    )
+    faces: Integers  # (n, 2) the body's triangles beside the edge: they cannot hide it; -1 where there is none
 
     @staticmethod
     def concatenate(parts: Sequence[Candidates]) -> Candidates:

@@ -6,6 +6,7 @@ import numpy as np
 
 from grimaldi.outlines import disk, mesh, planar, sphere
 from grimaldi.outlines.candidate import Candidates, toward
+from grimaldi.outlines.hidden import Queries, behind
 from grimaldi.outlines.lit import Stretches, lit_parts
 from grimaldi.outlines.model import Integers, Outline, Reals
 from grimaldi.scene.model import Body, Mesh, Scene, Source, Sphere
@@ -33,9 +34,20 @@ def outline(scene: Scene, source: Source, *, sag: float | None = None) -> Outlin
         return Outline.empty()
     body = np.repeat(np.arange(len(parts)), [len(part.start) for part in parts])
     edges = Candidates.concatenate(parts)
-    extent = float(np.linalg.norm(np.ptp(np.concatenate([edges.start, edges.end]), axis=0)))
-    lit = lit_parts(scene.bodies, source, edges, body, LONGEST * extent)
-    return _assemble(edges, body, lit, source, _sag(scene.bodies, sag))
+    extents = np.array([np.linalg.norm(np.ptp(part.start, axis=0)) if len(part.start) else 0.0 for part in parts])
+    lit = lit_parts(scene.bodies, source, edges, body, LONGEST * extents[body])
+    return _assemble(edges, body, lit, _behind(scene.bodies, source, edges, body, lit), source, _sag(scene.bodies, sag))
+
+
+def _behind(bodies: tuple[Body, ...], source: Source, edges: Candidates, body: Integers, lit: Stretches) -> Reals:
+    """For each lit stretch, how far behind its middle its own body comes next."""
+    c, at = lit.candidate, 0.5 * (lit.low + lit.high)
+    x = edges.start[c] + at[:, None] * (edges.end[c] - edges.start[c])
+    result = np.full(len(c), np.inf)
+    for number, of in enumerate(bodies):
+        own = body[c] == number
+        result[own] = behind(of, source, Queries(x, body[c], edges.faces[c])[own])
+    return result
 
 
 def _silhouette(body: Body, source: Source, sag: float | None) -> Candidates:
@@ -44,17 +56,13 @@ def _silhouette(body: Body, source: Source, sag: float | None) -> Candidates:
         return mesh.silhouette(geometry, source)
     if isinstance(geometry, Sphere):
         return sphere.silhouette(geometry, source, sag or DEFAULT_SAG * geometry.radius)
-    return disk.silhouette(
-        geometry, source, sag or DEFAULT_SAG * float(np.linalg.norm(geometry.to_world[:3, :2]))
-    )
+    return disk.silhouette(geometry, source, sag or DEFAULT_SAG * float(np.linalg.norm(geometry.to_world[:3, :2])))
 
 
 def _sag(bodies: tuple[Body, ...], sag: float | None) -> float:
     """The sag of the coarsest curve among the bodies."""
     sizes = [
-        b.geometry.radius
-        if isinstance(b.geometry, Sphere)
-        else float(np.linalg.norm(b.geometry.to_world[:3, :2]))
+        b.geometry.radius if isinstance(b.geometry, Sphere) else float(np.linalg.norm(b.geometry.to_world[:3, :2]))
         for b in bodies
         if not isinstance(b.geometry, Mesh)
     ]
@@ -71,10 +79,11 @@ def _planar(scene: Scene, source: Source, sag: float | None) -> Outline:
             parts.append(loop)
             number.append(np.full(len(loop.start), -1 - i))
     edges = Candidates.concatenate(parts)
-    return _assemble(edges, np.concatenate(number), Stretches.whole(len(edges.start)), source, sag or 0.0)
+    n = len(edges.start)
+    return _assemble(edges, np.concatenate(number), Stretches.whole(n), np.full(n, np.inf), source, sag or 0.0)
 
 
-def _assemble(edges: Candidates, body: Integers, lit: Stretches, source: Source, sag: float) -> Outline:
+def _assemble(edges: Candidates, body: Integers, lit: Stretches, behind: Reals, source: Source, sag: float) -> Outline:
     """The lit stretches in the order of their chains."""
     c = lit.candidate
     span = edges.end[c] - edges.start[c]
@@ -88,7 +97,7 @@ def _assemble(edges: Candidates, body: Integers, lit: Stretches, source: Source,
     size = np.linalg.norm(out, axis=1, keepdims=True)
     hole = (body[c] < 0)[:, None]  # a hole's open side is the one its loop encloses
     outward = np.where(hole, -out, out) / np.maximum(size, 1e-300)
-    return Outline(start, end, body[c], edges.edge[c], interval, edges.normals[c], outward, chain, sag)
+    return Outline(start, end, body[c], edges.edge[c], interval, edges.normals[c], outward, behind[order], chain, sag)
 
 
 def _chains(start: Reals, end: Reals) -> tuple[Integers, Integers]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -79,9 +80,28 @@ def _between(source: Source, t: Reals, least: float) -> NDArray[np.bool_]:
     return (t > least) & (t < (np.inf if source.is_plane else 1.0))
 
 
-def _by_mesh(
-    mesh: Mesh, source: Source, queries: Queries, own: NDArray[np.bool_], least: float
-) -> NDArray[np.bool_]:
+def behind(body: Body, source: Source, queries: Queries) -> Reals:
+    """How far behind each point, away from the source, its own body comes next [scene units]; inf where it does not."""
+    result = np.full(len(queries.x), np.inf)
+    if not isinstance(body.geometry, Mesh):
+        return result
+    own = np.ones(len(queries.x), bool)
+    for point, t in _meetings(body.geometry, source, queries, own):
+        away = t < -TOUCHING
+        length = np.linalg.norm(toward(source, queries.x[point]), axis=1)
+        np.minimum.at(result, point[away], (-t * length)[away])
+    return result
+
+
+def _by_mesh(mesh: Mesh, source: Source, queries: Queries, own: NDArray[np.bool_], least: float) -> NDArray[np.bool_]:
+    result = np.zeros(len(queries.x), bool)
+    for point, t in _meetings(mesh, source, queries, own):
+        result[point[_between(source, t, least)]] = True
+    return result
+
+
+def _meetings(mesh: Mesh, source: Source, queries: Queries, own: NDArray[np.bool_]) -> Iterator[tuple[Integers, Reals]]:
+    """Where lines x + t·toward meet triangles, in parts: which query, and t. Triangles beside an edge do not count."""
     corners = mesh.vertices[mesh.faces]
     seen = view(source, corners)
     centres = seen.mean(axis=1)
@@ -95,24 +115,21 @@ def _by_mesh(
     face, point = overlaps(centres, radii, view(source, queries.x), 1e-12, wide)
     beside = own[point] & (queries.faces[point] == face[:, None]).any(axis=1)
     face, point = face[~beside], point[~beside]
-    result = np.zeros(len(queries.x), bool)
     for part in np.array_split(np.arange(len(face)), len(face) // 1_000_000 + 1):
         f, p = face[part], point[part]
-        hit = crosses(corners[f], queries.x[p], toward(source, queries.x[p]), source, least)
-        result[p[hit]] = True
-    return result
+        t = meeting(corners[f], queries.x[p], toward(source, queries.x[p]))
+        met = np.isfinite(t)
+        yield p[met], t[met]
 
 
-def crosses(corners: Reals, x: Reals, w: Reals, source: Source, least: float) -> NDArray[np.bool_]:
-    """Whether x + t w meets triangles (n, 3, 3) between x and the source; an edge belongs to both its triangles."""
+def meeting(corners: Reals, x: Reals, w: Reals) -> Reals:
+    """t where lines x + t w meet triangles (n, 3, 3), NaN where they miss; an edge belongs to both its triangles."""
     a, b, c = np.moveaxis(corners - x[:, None], 1, 0)
     bc, ca, ab = np.cross(b, c), np.cross(c, a), np.cross(a, b)
     u, v, s = (np.einsum("ij,ij->i", w, n) for n in (bc, ca, ab))
     inside = ((u >= 0) & (v >= 0) & (s >= 0)) | ((u <= 0) & (v <= 0) & (s <= 0))
-    total = u + v + s
     with np.errstate(divide="ignore", invalid="ignore"):
-        t = np.einsum("ij,ij->i", a, bc) / total
-    return inside & (total != 0) & _between(source, t, least)
+        return np.where(inside, np.einsum("ij,ij->i", a, bc) / (u + v + s), np.nan)
 
 
 def _by_sphere(sphere: Sphere, source: Source, x: Reals, least: float) -> NDArray[np.bool_]:
@@ -120,9 +137,7 @@ def _by_sphere(sphere: Sphere, source: Source, x: Reals, least: float) -> NDArra
     a, b, c = ((p * q).sum(1) for p, q in ((w, w), (w, d), (d, d)))
     root = b * b - a * (c - sphere.radius**2)
     reach = np.sqrt(np.maximum(root, 0))
-    return (root > 0) & (
-        _between(source, (-b - reach) / a, least) | _between(source, (-b + reach) / a, least)
-    )
+    return (root > 0) & (_between(source, (-b - reach) / a, least) | _between(source, (-b + reach) / a, least))
 
 
 def _by_disk(disk: Disk, source: Source, x: Reals, least: float) -> NDArray[np.bool_]:

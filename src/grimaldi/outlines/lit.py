@@ -33,14 +33,11 @@ class Stretches:
         return Stretches(self.candidate[which], self.low[which], self.high[which])
 
 
-def lit_parts(
-    bodies: tuple[Body, ...], source: Source, edges: Candidates, body: Integers, longest: float
-) -> Stretches:
+def lit_parts(bodies: tuple[Body, ...], source: Source, edges: Candidates, body: Integers, longest: Reals) -> Stretches:
     """What the source reaches of the candidates, in order along them.
 
-    body (n,): whose edges they are. Whether the source reaches an edge changes only where it passes behind another
+    body (n,): whose edges they are; longest (n,): no stretch of an edge comes out longer than this. Whether the source reaches an edge changes only where it passes behind another
     outline (found exactly, by the signs of determinants) or runs into a surface (by bisection between samples).
-    No stretch comes out longer than `longest`.
     """
     all_ = _between_cuts(len(edges.start), *_crossings(source, edges))
 
@@ -66,9 +63,7 @@ def lit_parts(
     borders.append(all_.high)
     for i, state in enumerate(states):
         parts.append(Stretches(all_.candidate, borders[i], borders[i + 1])[state])
-    joined = _joined(
-        Stretches(*(np.concatenate([getattr(p, f) for p in parts]) for f in ("candidate", "low", "high")))
-    )
+    joined = _joined(Stretches(*(np.concatenate([getattr(p, f) for p in parts]) for f in ("candidate", "low", "high"))))
     return _divided(joined, edges, longest)
 
 
@@ -93,10 +88,8 @@ def _crossings(source: Source, edges: Candidates) -> tuple[Integers, Reals]:
     y = edges.start[j] + s[:, None] * (edges.end[j] - edges.start[j])
     w = toward(source, x)
     ahead = np.einsum("ij,ij->i", y - x, w) / np.maximum(np.einsum("ij,ij->i", w, w), 1e-300)
-    if source.is_plane:
-        nearer = ahead > 0
-    else:
-        nearer = (ahead > 0) & (ahead < 1)  # on the same side of the source, and closer to it
+    # closer to a point source than x, and on the same side of it
+    nearer = ahead > 0 if source.is_plane else (ahead > 0) & (ahead < 1)
     keep = across_i & across_j & nearer
     return i[keep], t[keep]
 
@@ -113,8 +106,9 @@ def _cut(source: Source, edges: Candidates, i: Integers, j: Integers) -> tuple[R
     origin = edges.start[j]
     low = np.einsum("ij,ij->i", edges.start[i] - origin, normal)
     high = np.einsum("ij,ij->i", edges.end[i] - origin, normal)
+    across = (low > 0) != (high > 0)
     with np.errstate(divide="ignore", invalid="ignore"):
-        return np.nan_to_num(low / (low - high)), (low > 0) != (high > 0)
+        return np.where(across, low / (low - high), 0.0), across
 
 
 def _between_cuts(n: int, owner: Integers, at: Reals) -> Stretches:
@@ -149,10 +143,10 @@ def _joined(parts: Stretches) -> Stretches:
     return Stretches(parts.candidate[first], parts.low[first], parts.high[last])
 
 
-def _divided(parts: Stretches, edges: Candidates, longest: float) -> Stretches:
+def _divided(parts: Stretches, edges: Candidates, longest: Reals) -> Stretches:
     """Stretches cut evenly so that none is longer than `longest`."""
     length = np.linalg.norm(edges.end - edges.start, axis=1)[parts.candidate] * (parts.high - parts.low)
-    pieces = np.maximum(np.ceil(length / longest), 1).astype(np.int64)
+    pieces = np.maximum(np.ceil(length / longest[parts.candidate]), 1).astype(np.int64)
     which = np.repeat(np.arange(len(pieces)), pieces)
     step = np.arange(len(which)) - np.repeat(np.cumsum(pieces) - pieces, pieces)
     span = (parts.high - parts.low)[which] / pieces[which]

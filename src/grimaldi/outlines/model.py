@@ -27,6 +27,7 @@ class Outline:
     interval: Reals  # (n, 2) the lit part of that edge, as parameters in 0..1
     normals: Reals  # (n, 2, 3) unit normals of the two faces beside, towards the source first; 0 where there is none
     outward: Reals  # (n, 3) unit, across the ray from the source, towards the open side
+    behind: Reals  # (n,) how far behind it, along the ray, its own body comes next; inf behind outer outlines
     chain: Integers  # (n,) segments of one chain follow each other in the arrays, end to start
     sag: float = 0.0  # how far a segment may lie from the curve that it stands for [scene units]
 
@@ -38,4 +39,4 @@ class Outline:
         """Nothing stands in the light."""
         none = np.empty(0, np.int64)
         points = np.empty((0, 3))
-        return Outline(points, points, none, none, np.empty((0, 2)), np.empty((0, 2, 3)), points, none)
+        return Outline(points, points, none, none, np.empty((0, 2)), np.empty((0, 2, 3)), points, np.empty(0), none)
