@@ -18,7 +18,6 @@ import grimaldi
 
 SCENE = """
 <scene version="3.0.0">
-    <integrator type="wave"/>
     <sensor type="perspective">
         <transform name="to_world"><lookat origin="0, 0, 0" target="0, 0, 10" up="0, 1, 0"/></transform>
         <film type="hdrfilm"><integer name="width" value="8"/><integer name="height" value="6"/></film>
@@ -65,7 +64,7 @@ def said(done: subprocess.CompletedProcess[str]) -> str:
         (["rendr", "young"], "render"),
         (["render", "young"], "--output"),
         (["render", "-o", "x.png"], "scene"),
-        (["render", "young", "-o", "x.jpg"], "x.jpg: unknown kind of file '.jpg'"),
+        (["render", "young", "-o", "x.jpg"], "x.jpg: unknown kind of picture '.jpg'"),
         (["render", "young", "-o", "nowhere/x.png"], "the folder nowhere does not exist"),
         (["render", "young", "-o", "x.png", "--size", "20by30"], "--size: '20by30'"),
         (["render", "young", "-o", "x.png", "--size", "0x30"], "--size: '0x30'"),
@@ -85,11 +84,15 @@ def said(done: subprocess.CompletedProcess[str]) -> str:
         (["field", "young", "-o", "x.npz", "--plane", "0,0,0; 1,0,0; 0,nan,0; 2x2"], "--plane: cannot read"),
         (["field", "young", "-o", "x.npz", "--plane", "0,0,0; 1,0,0; 0,1,0; 0x2"], "--plane: cannot read"),
         (["field", "young", "-o", "x.dat", "--plane", PLANE], "x.dat: unknown kind of file"),
+        (["field", "young", "-o", "folder.nc", "--plane", PLANE], "folder.nc: is a folder"),
+        (["field", "young", "-o", "words.zarr", "--plane", PLANE], "words.zarr: is a file"),
         (["outline", "young", "-o", "x.pdf"], "x.pdf: unknown kind of file"),
     ],
 )
 def test_wrong_usage_is_one_line_and_writes_nothing(tmp_path: Path, arguments: list[str], named: str) -> None:
     (tmp_path / "words.csv").write_text("x,y,z\n1,2,three\n")
+    (tmp_path / "words.zarr").write_text("not a folder")
+    (tmp_path / "folder.nc").mkdir()
     (tmp_path / "two.csv").write_text("1,2\n")
     (tmp_path / "nan.csv").write_text("1,2,3\n4,nan,6\n")
     (tmp_path / "words.npy").write_text("not an array")

@@ -20,8 +20,6 @@ def replacing(path: str | Path) -> Iterator[Path]:
     """
     path = Path(path)
     check_writable(path)
-    if path.is_dir():
-        raise InputError(f"{path}: is a folder; name a file in it")
     try:
         handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.stem}-", suffix=path.suffix)
     except OSError as error:
@@ -40,9 +38,7 @@ def replacing(path: str | Path) -> Iterator[Path]:
 def replacing_folder(path: str | Path) -> Iterator[Path]:
     """Like `replacing`, for output that is a folder: a new one that takes the place of an older one."""
     path = Path(path)
-    check_writable(path)
-    if path.exists() and not path.is_dir():
-        raise InputError(f"{path}: is a file; remove it, or choose another name")
+    check_writable(path, folder=True)
     with tempfile.TemporaryDirectory(dir=path.parent, prefix=f".{path.stem}-") as scratch:
         new, old = Path(scratch, "new"), Path(scratch, "old")
         new.mkdir()
@@ -52,13 +48,17 @@ def replacing_folder(path: str | Path) -> Iterator[Path]:
         new.rename(path)
 
 
-def check_writable(path: str | Path) -> None:
-    """Raise InputError where the folder of `path` is missing or cannot be written to."""
-    folder = Path(path).parent
-    if not folder.is_dir():
-        raise InputError(f"{path}: the folder {folder} does not exist; make it first")
-    if not os.access(folder, os.W_OK | os.X_OK):
-        raise InputError(f"{path}: the folder {folder} is not writable; choose another")
+def check_writable(path: str | Path, *, folder: bool = False) -> None:
+    """Raise InputError where no file, or no folder, can be put at `path`."""
+    path = Path(path)
+    if not path.parent.is_dir():
+        raise InputError(f"{path}: the folder {path.parent} does not exist; make it first")
+    if not os.access(path.parent, os.W_OK | os.X_OK):
+        raise InputError(f"{path}: the folder {path.parent} is not writable; choose another")
+    if path.is_dir() and not folder:
+        raise InputError(f"{path}: is a folder; name a file in it")
+    if path.exists() and folder and not path.is_dir():
+        raise InputError(f"{path}: is a file; remove it, or choose another name")
 
 
 def _umask() -> int:

@@ -54,7 +54,7 @@ def check_output(path: Path, suffixes: tuple[str, ...]) -> None:
         raise InputError(
             f"{path}: unknown kind of file {path.suffix!r}; end the name in {', '.join(suffixes)}"
         )
-    check_writable(path)
+    check_writable(path, folder=path.suffix.lower() == ".zarr")
 
 
 def set_variant(name: str | None) -> None:

@@ -38,8 +38,9 @@ def render(
     """Render SCENE with interference and diffraction."""
     from grimaldi import film
 
-    for path in output:
-        options.check_output(path, (".exr", ".png"))
+    views = ["picture" if path.suffix.lower() == ".exr" else view for path in output]
+    for path, shown in zip(output, views, strict=True):
+        film.check(path, shown)
     chosen = options.given(
         wavelength=wavelength,
         scene_unit=scene_unit,
@@ -57,8 +58,8 @@ def render(
     import grimaldi
 
     dataset = grimaldi.render(scene, **chosen)
-    for path in output:
-        film.write(dataset, path, view if path.suffix.lower() == ".png" else "picture")
+    for path, shown in zip(output, views, strict=True):
+        film.write(dataset, path, shown)
 
 
 def parse_size(text: str) -> tuple[int, int]:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from grimaldi.errors import InputError
+from grimaldi.files import check_writable
 from grimaldi.film import exr, png
 from grimaldi.film.colour import automatic_exposure
 
@@ -55,5 +56,4 @@ def check(path: str | Path, view: str = "picture", *, exposure: float | None = N
         )
     if exposure is not None and not 0 < exposure < float("inf"):
         raise InputError(f"exposure: {exposure} is not a positive number; give a factor such as 1.0")
-    if not path.parent.is_dir():
-        raise InputError(f"{path}: the folder {path.parent} does not exist; make it first")
+    check_writable(path)
