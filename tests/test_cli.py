@@ -109,9 +109,7 @@ def test_a_folder_that_cannot_be_written_to_is_found_first(tmp_path: Path) -> No
         folder = Path("/proc/self")  # no user, root neither, writes there
     if os.access(folder, os.W_OK):
         pytest.skip("every folder is writable here")
-    assert f"the folder {folder} is not writable" in said(
-        command("render", "missing", "-o", folder / "x.png")
-    )
+    assert f"the folder {folder} is not writable" in said(command("render", "missing", "-o", folder / "x.png"))
 
 
 def test_help_and_version() -> None:
@@ -179,9 +177,7 @@ def test_render_writes_every_output_of_one_computation(tmp_path: Path, scene: Pa
 
 def test_outline_needs_the_source_named_among_several(tmp_path: Path, scene: Path) -> None:
     assert "name one with --source" in said(command("outline", scene, "-o", tmp_path / "out.svg"))
-    assert "no source 'lamp'" in said(
-        command("outline", scene, "--source", "lamp", "-o", tmp_path / "out.svg")
-    )
+    assert "no source 'lamp'" in said(command("outline", scene, "--source", "lamp", "-o", tmp_path / "out.svg"))
 
 
 def test_a_scene_without_wavelength_says_one(tmp_path: Path, scene: Path) -> None:

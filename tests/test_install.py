@@ -24,9 +24,7 @@ PLUGINS = {
 def python(code: str, **environment: str) -> str:
     """What a fresh interpreter prints."""
     inherited = {name: value for name, value in os.environ.items() if name != "DRJIT_LIBLLVM_PATH"}
-    done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, env=inherited | environment
-    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=inherited | environment)
     assert done.returncode == 0, done.stderr
     return done.stdout
 

@@ -45,7 +45,5 @@ def test_a_short_job_shows_nothing(monkeypatch: pytest.MonkeyPatch, clock: list[
     assert written(monkeypatch, Terminal(), clock, 0.9) == ""
 
 
-def test_nothing_is_shown_where_there_is_no_terminal(
-    monkeypatch: pytest.MonkeyPatch, clock: list[float]
-) -> None:
+def test_nothing_is_shown_where_there_is_no_terminal(monkeypatch: pytest.MonkeyPatch, clock: list[float]) -> None:
     assert written(monkeypatch, io.StringIO(), clock, 20.0) == ""

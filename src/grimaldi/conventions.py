@@ -19,9 +19,7 @@ SIGNS = "exp(-i omega t): U = A exp(i phase) exp(+i k R)/R, so phase grows with 
 Wavelength = float | str | Sequence[float | str]
 
 # A number, then perhaps one unit's name: pint's own expressions ("2**9**9 nm") are none of our business.
-_QUANTITY = re.compile(
-    r"\s*(?P<number>[-+]?(?:\d[\d_]*\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)?\s*(?P<unit>[^\W\d_]+)?\s*"
-)
+_QUANTITY = re.compile(r"\s*(?P<number>[-+]?(?:\d[\d_]*\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)?\s*(?P<unit>[^\W\d_]+)?\s*")
 
 
 def parse_wavelengths(wavelength: Wavelength, scene_unit: str | None = None) -> tuple[float, ...]:

@@ -48,9 +48,7 @@ def libllvm_problem() -> str | None:
     if version[0] < 0:
         wrong = f"no usable libLLVM (Grimaldi needs LLVM {libllvm.MINIMUM} or newer)"
     else:
-        wrong = (
-            f"libLLVM {'.'.join(map(str, version))} is too old (Grimaldi needs {libllvm.MINIMUM} or newer)"
-        )
+        wrong = f"libLLVM {'.'.join(map(str, version))} is too old (Grimaldi needs {libllvm.MINIMUM} or newer)"
     if chosen:
         wrong = f"{libllvm.VARIABLE}={chosen}: {wrong}"
     return f"{wrong}: {_remedy(chosen)}"

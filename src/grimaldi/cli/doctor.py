@@ -47,9 +47,7 @@ def _wrong_packages() -> list[str]:
             version = None
         if version is None or version not in requirement.specifier:
             mend = f"run '{sys.executable} -m pip install \"{requirement.name}{requirement.specifier}\"'"
-            wrong.append(
-                f"{requirement.name} is {version or 'missing'}, needs {requirement.specifier}: {mend}"
-            )
+            wrong.append(f"{requirement.name} is {version or 'missing'}, needs {requirement.specifier}: {mend}")
     return wrong
 
 
@@ -70,9 +68,7 @@ def _back_ends() -> list[str]:
         _line("variant", f"{best_variant('rgb')} for render, {best_variant('mono')} for field")
     problems = [] if wrong is None else [wrong]
     if not gpu and shutil.which("nvidia-smi"):
-        problems.append(
-            "nvidia-smi is here but CUDA does not answer: run 'nvidia-smi', and update the driver"
-        )
+        problems.append("nvidia-smi is here but CUDA does not answer: run 'nvidia-smi', and update the driver")
     return problems
 
 

@@ -14,9 +14,7 @@ from grimaldi.errors import InputError
 def field(
     scene: options.Scene,
     output: Annotated[Path, typer.Option("--output", "-o", help="OUT.nc, OUT.zarr or OUT.npz.")],
-    points: Annotated[
-        Path | None, typer.Option(help="Points x, y, z in rows: .npy or .csv.", metavar="FILE")
-    ] = None,
+    points: Annotated[Path | None, typer.Option(help="Points x, y, z in rows: .npy or .csv.", metavar="FILE")] = None,
     plane: Annotated[
         str | None,
         typer.Option(

@@ -32,9 +32,7 @@ Interference = Annotated[
     bool | None,
     typer.Option("--interference/--no-interference", help="Whether sources of one group add as fields."),
 ]
-Tolerance = Annotated[
-    float | None, typer.Option(help="Largest error of M for each source and point.  [default: 1e-3]")
-]
+Tolerance = Annotated[float | None, typer.Option(help="Largest error of M for each source and point.  [default: 1e-3]")]
 Precision = Annotated[Literal["auto", "double"] | None, typer.Option(help="Of the edge integrals.")]
 Variant = Annotated[
     str | None, typer.Option(help="Mitsuba's variant, such as llvm_ad_rgb.  [default: the best that works]")
@@ -51,9 +49,7 @@ def check_output(path: Path, suffixes: tuple[str, ...]) -> None:
     from grimaldi.files import check_writable
 
     if path.suffix.lower() not in suffixes:
-        raise InputError(
-            f"{path}: unknown kind of file {path.suffix!r}; end the name in {', '.join(suffixes)}"
-        )
+        raise InputError(f"{path}: unknown kind of file {path.suffix!r}; end the name in {', '.join(suffixes)}")
     check_writable(path, folder=path.suffix.lower() == ".zarr")
 
 

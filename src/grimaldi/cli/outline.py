@@ -12,9 +12,7 @@ from grimaldi.cli import options
 
 def outline(
     scene: options.Scene,
-    output: Annotated[
-        Path, typer.Option("--output", "-o", help="OUT.svg, OUT.png (the shadow mask), or OUT.ply.")
-    ],
+    output: Annotated[Path, typer.Option("--output", "-o", help="OUT.svg, OUT.png (the shadow mask), or OUT.ply.")],
     source: Annotated[
         str | None, typer.Option(help="Which source, by name; needed where the scene has several.")
     ] = None,
