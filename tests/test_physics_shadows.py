@@ -179,7 +179,7 @@ def test_an_arm_before_a_torso():
     # On the lit face the torso's own outline is silent: the arm alone casts its shadow there.
     opening = oracle.polygon_edge(square((2, 20), z=-20))
     expected = 1 - oracle.edge_factor(light, on_torso, opening, 1)
-    assert abs(expected[28]) < 0.5
+    assert abs(expected[28]) < 0.6
     computed = factor(light, on_torso, arm, torso, tolerance=1e-4)
     np.testing.assert_allclose(computed, expected, rtol=0, atol=1e-3)
     # Behind the torso the arm is hidden, whichever way round.
@@ -198,9 +198,9 @@ def blocked(points, nodes, z, centre, radius):
 
 def test_two_discs_side_by_side_at_two_depths():
     light = oracle.Spherical((0, 0, -100))
-    places = [(-12, 0, 0), (14, 1, 20)]
+    places = [(-12, 0, 0), (30, 1, 20)]
     discs = [affine(8, at=place) for place in places]
-    points = line((-60, 2, 120), (60, 2, 120), 25)
+    points = line((-60, 2, 120), (80, 2, 120), 29)
     wave = sum(oracle.edge_factor(light, points, oracle.circle_edge(disc), 1) for disc in discs)
     hidden = blocked(points, oracle.circle_edge(discs[0], 400).x, 20, places[1][:2], 8)
     assert not hidden.any()
