@@ -125,5 +125,5 @@ def test_wrong_files_are_named(tmp_path: Path, name, content, says):
 
 @pytest.mark.parametrize("to_world", [np.zeros((4, 4)), np.eye(3), np.diag([1, 0, 1, 1]), np.eye(4) * np.nan, "x"])
 def test_wrong_to_world_is_named(to_world):
-    with pytest.raises(InputError, match="to_world is (singular|no affine map)"):
+    with pytest.raises(InputError, match=r"to_world is (singular|no affine map)"):
         PlanarOutline(SQUARE, to_world)

@@ -59,10 +59,15 @@ def blockers(mi_scene: Any, bodies: Iterable[Body]) -> Any:
     import mitsuba as mi
 
     shapes = mi_scene.shapes()
-    opaque = {f"body-{body.shape}": shapes[body.shape] for body in bodies}
+    opaque = [shapes[body.shape] for body in bodies]
     if not opaque:
         return None
-    return mi.load_dict({"type": "scene", "embree_use_robust_intersections": True, **opaque})
+    names = [shape.id() for shape in opaque]
+    parts = {f"body-{i}": shape for i, shape in enumerate(opaque)}
+    scene = mi.load_dict({"type": "scene", "embree_use_robust_intersections": True, **parts})
+    for shape, name in zip(opaque, names, strict=True):  # loading renames them by their keys
+        shape.set_id(name)
+    return scene
 
 
 def faces_inward(mi_scene: Any, body: Body) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
 
 import numpy as np
@@ -60,7 +61,7 @@ def _check_overlap(holes: tuple[PlanarOutline, ...]) -> None:
 
     frame = np.linalg.qr(holes[0].to_world[:3, :2])[0]
     regions = [
-        shapely.symmetric_difference_all([shapely.Polygon(loop @ frame) for loop in hole.world_loops()])
+        functools.reduce(shapely.symmetric_difference, [shapely.Polygon(x @ frame) for x in hole.world_loops()])
         for hole in holes
     ]
     first, second = shapely.STRtree(regions).query(regions, predicate="intersects")
