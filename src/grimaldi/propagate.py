@@ -21,9 +21,7 @@ class Wave(NamedTuple):
     error: Any
 
 
-def propagate(
-    scene: Scene, source: Source, model: Model, k: float, options: Options
-) -> Callable[[Receivers], Wave]:
+def propagate(scene: Scene, source: Source, model: Model, k: float, options: Options) -> Callable[[Receivers], Wave]:
     """Find what stands in the source's light; return U (eq. 1-2 times M) as a function of receivers.
 
     k: wavenumber [1/scene unit]. The function is pure and can be traced inside a larger kernel.

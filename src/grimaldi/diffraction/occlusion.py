@@ -13,6 +13,9 @@ from grimaldi.diffraction.table import Piece
 from grimaldi.scene.model import Mesh, Scene, Source, Sphere
 
 
+GRAZING = 1e-3  # rad: Float32 rays along a face at x hit it or not, as rounding goes
+
+
 class Rays(NamedTuple):
     """Visibility rays among the bodies of one scene, for one source."""
 
@@ -52,8 +55,10 @@ class Rays(NamedTuple):
         end = length - 4 * self.epsilon
         hit = self.blockers.ray_intersect_preliminary(mi.Ray3f(p, d, end, 0, mi.Color0f()), active=active)
         blocked = hit.is_valid()
-        inside = (piece.closed > 0.5) & (dr.dot(piece.lit, d) > 0) & (dr.dot(piece.dark, d) > 0)
-        inside &= end - hit.t < piece.behind
+        depth = dr.minimum(dr.dot(piece.lit, d), dr.dot(piece.dark, d))  # sine of the angle below the faces at x
+        left = end - hit.t
+        inside = (piece.closed > 0.5) & (depth > 0) & (left < piece.behind)
+        blocked &= (piece.closed < 0.5) | (dr.abs(depth) > GRAZING) | (left > 8 * piece.reach)
         if active & blocked & inside:
             start = hit.t + self.epsilon
             blocked = self.blockers.ray_test(

@@ -120,7 +120,7 @@ def _tangent_circle(sphere: Sphere, source: Source) -> tuple[Reals, Reals]:
         axis = axis / distance
         ratio = min(sphere.radius / distance, 1.0)
         centre = sphere.centre - sphere.radius * ratio * axis
-        radius = sphere.radius * np.sqrt(1 - ratio**2)
+        radius = sphere.radius * float(np.sqrt(1 - ratio**2))
     else:
         assert source.direction is not None
         axis, centre, radius = source.direction, sphere.centre, sphere.radius

@@ -71,6 +71,7 @@ def _draw(outline: Outline, mask: Mask, title: str, path: Path) -> None:
     figure = Figure(figsize=(width * scale, height * scale + 0.4), dpi=DPI)
     axes = figure.add_axes((0, 0.4 / (height * scale + 0.4), 1, height * scale / (height * scale + 0.4)))
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), xticks=[], yticks=[], aspect="equal")
+    axes.spines[:].set_visible(False)
     axes.set_facecolor(GREY if mask.hole else "white")
     if not mask.region.is_empty:
         axes.add_patch(PathPatch(_path(mask.region), fc="white" if mask.hole else GREY, ec="none"))

@@ -53,6 +53,5 @@ def film(width: int, height: int) -> dict[str, Any]:
         "width": width,
         "height": height,
         "component_format": "float32",
-        "pixel_format": "rgb",
         "rfilter": {"type": "box"},
     }
