@@ -42,8 +42,9 @@ def transform() -> Any:
 
 def picture(emitter: dict[str, Any], integrator: str, bsdf: str = "aperture") -> np.ndarray:
     """A sphere before a wall, and a small see-through square that throws a shadow."""
+    render: Any = mi.render  # its seed may be an int, the stubs do not know
     return np.array(
-        mi.render(
+        render(
             mi.load_dict(
                 {
                     "type": "scene",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import mitsuba as mi
 import numpy as np
@@ -79,7 +79,8 @@ def test_xml_with_unit_includes_and_files_beside_it(tmp_path: Path, monkeypatch:
     assert {body.name for body in scene.bodies} == {"sheet", "ball"}
     assert [source.name for source in scene.sources] == ["lamp"]
     np.testing.assert_array_equal(scene.sources[0].position, [0.1, -7, 0.25])
-    assert str(tmp_path) not in str(mi.file_resolver())
+    resolver: Any = mi.file_resolver  # pyright: ignore[reportAttributeAccessIssue]
+    assert str(tmp_path) not in str(resolver())
     assert grimaldi.load(str(tmp_path / "scene.xml"), scene_unit="1 mm").unit == "1 mm"
 
 
@@ -195,7 +196,7 @@ def test_sources(variant, tint):
             d={"type": "coherent_directional", "direction": [0, 3, 4], "group": "blue"},
         )
     )
-    a, b, c, d = sorted(scene.sources, key=lambda source: source.name)
+    a, b, c, d = cast(Any, sorted(scene.sources, key=lambda source: source.name))
     white = (1.0,) * len(tint)
     assert [source.group for source in (a, b, c, d)] == ["a", "b", "0", "blue"]
     assert [source.is_plane for source in (a, b, c, d)] == [False, True, False, True]
