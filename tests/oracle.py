@@ -195,9 +195,7 @@ def _boundary(
         integrand = (geometric - c * np.exp(1j * k * detour)) * azimuth
         result[i] = integrand[visible[i]].sum() / (2 * np.pi)
     # A loop's sense is a convention: it follows its own area vector, seen along the ray.
-    side = np.sign(
-        np.cross(outline.x - outline.x.mean(axis=0), outline.w).sum(axis=0) @ _axis(source, outline)
-    )
+    side = np.sign(np.cross(outline.x - outline.x.mean(axis=0), outline.w).sum(axis=0) @ _axis(source, outline))
     return side * result
 
 

@@ -32,9 +32,6 @@ def _slit(
     width: float, x: ArrayLike, distance: float, wavelength: float, source_distance: float
 ) -> NDArray[np.complex128]:
     x = np.asarray(x, float)
-    sides = (
-        fresnel_edge.parameter(side * width / 2 - x, distance, wavelength, source_distance)
-        for side in (-1, 1)
-    )
+    sides = (fresnel_edge.parameter(side * width / 2 - x, distance, wavelength, source_distance) for side in (-1, 1))
     left, right = (fresnel_edge.factor(v) for v in sides)
     return left - right

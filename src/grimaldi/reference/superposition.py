@@ -24,9 +24,7 @@ def fields(
     extended = np.longdouble
     receivers = np.asarray(points, extended)
     total: dict[Hashable, NDArray[np.complex128]] = {}
-    sources = zip(
-        np.asarray(positions, extended), np.asarray(amplitudes), np.asarray(phases), groups, strict=True
-    )
+    sources = zip(np.asarray(positions, extended), np.asarray(amplitudes), np.asarray(phases), groups, strict=True)
     for position, amplitude, phase, group in sources:
         length = np.sqrt(((receivers - position) ** 2).sum(axis=-1))
         cycles = length / extended(wavelength)
