@@ -17,9 +17,7 @@ if TYPE_CHECKING:
 __all__ = ["automatic_exposure", "write"]
 
 
-def write(
-    dataset: xr.Dataset, path: str | Path, view: str = "picture", *, exposure: float | None = None
-) -> None:
+def write(dataset: xr.Dataset, path: str | Path, view: str = "picture", *, exposure: float | None = None) -> None:
     """Write what `grimaldi.render` returned to `path`: all layers to .exr, one view to .png.
 
     Args:
@@ -51,9 +49,7 @@ def check(path: str | Path, view: str = "picture", *, exposure: float | None = N
         near = get_close_matches(view, png.VIEWS, n=1, cutoff=0.0)[0]
         raise InputError(f"view: no view {view!r}; did you mean {near!r}? ({', '.join(png.VIEWS)})")
     if path.suffix.lower() == ".exr" and view != "picture":
-        raise InputError(
-            f"view: {path} holds every layer, so it takes no view {view!r}; write a .png for one"
-        )
+        raise InputError(f"view: {path} holds every layer, so it takes no view {view!r}; write a .png for one")
     if exposure is not None and not 0 < exposure < float("inf"):
         raise InputError(f"exposure: {exposure} is not a positive number; give a factor such as 1.0")
     check_writable(path)

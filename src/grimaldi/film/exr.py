@@ -52,8 +52,7 @@ def channels(dataset: xr.Dataset) -> dict[str, NDArray[np.float32]]:
     picture = dataset["picture"].transpose("y", "x", "channel")
     field = dataset["U"].transpose("wavelength", "group", "y", "x")
     layers = {
-        name: picture.sel(channel=name if name in picture["channel"].values else "L").values
-        for name in ("R", "G", "B")
+        name: picture.sel(channel=name if name in picture["channel"].values else "L").values for name in ("R", "G", "B")
     }
     layers["intensity"] = dataset["intensity"].transpose("y", "x").values
     layers["phase"] = np.angle(field.values[0, 0])

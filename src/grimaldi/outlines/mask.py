@@ -124,10 +124,10 @@ def _tangent_circle(sphere: Sphere, source: Source) -> tuple[Reals, Reals]:
     else:
         assert source.direction is not None
         axis, centre, radius = source.direction, sphere.centre, sphere.radius
-    first: Reals = np.cross(axis, np.eye(3)[np.abs(axis).argmin()])
+    aside: Reals = np.eye(3)[np.abs(axis).argmin()]
+    first = np.cross(axis, aside)
     first /= np.linalg.norm(first)
-    second: Reals = np.cross(axis, first)
-    return centre, centre + radius * _circle() @ np.stack([first, second])
+    return centre, centre + radius * _circle() @ np.stack([first, np.cross(axis, first)])
 
 
 def _circle() -> Reals:

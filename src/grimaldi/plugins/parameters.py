@@ -44,3 +44,16 @@ def group(props: Any) -> str:
     if isinstance(value, bool) or not isinstance(value, (str, int)) or not str(value).strip():
         raise InputError(f"{props.plugin_name()}: group is {value!r}; give a name or an integer")
     return str(value)
+
+
+def names(props: Any, name: str) -> tuple[str, ...]:
+    """Names separated by commas; none unless given."""
+    return tuple(part.strip() for part in str(props.get(name, "")).split(",") if part.strip())
+
+
+def depth(props: Any, name: str, default: int, *, least: int) -> int:
+    """A path length, or -1 for no limit."""
+    value = props.get(name, default)
+    if isinstance(value, bool) or not isinstance(value, int) or (value < least and value != -1):
+        raise InputError(f"{props.plugin_name()}: {name} is {value!r}; give {least} or more, or -1 for no limit")
+    return value

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
 from difflib import get_close_matches
@@ -20,7 +20,13 @@ from grimaldi.scene.sources import sources
 from grimaldi.scene.xml import DEEPEST, check_xml
 
 
-def load(scene: Any, *, outlines: Iterable[PlanarOutline] = (), scene_unit: str | None = None) -> Scene:
+def load(
+    scene: Any,
+    *,
+    outlines: Iterable[PlanarOutline] = (),
+    scene_unit: str | None = None,
+    coherent: Collection[str] = (),
+) -> Scene:
     """A checked scene: its opaque bodies, holes and sources in Float64, and the Mitsuba scene itself.
 
     Args:
@@ -30,6 +36,7 @@ def load(scene: Any, *, outlines: Iterable[PlanarOutline] = (), scene_unit: str 
         scene_unit: length of one scene unit, such as "1 um". Otherwise that of the scene itself: in XML
             `<string name="scene_unit" value="1 um"/>` directly in `<scene>`, in a dictionary the key
             "scene_unit" beside "type".
+        coherent: ids of Mitsuba's `point` and `directional` lights that join coherence group "0".
 
     Where no Mitsuba variant is set, the best mono one that works is.
 
@@ -46,7 +53,7 @@ def load(scene: Any, *, outlines: Iterable[PlanarOutline] = (), scene_unit: str 
             return scene
         loaded = scene
     else:
-        loaded = _read(scene)
+        loaded = _read(scene, coherent)
     loaded = replace(
         loaded,
         holes=(*loaded.holes, *(outline for outline in added if outline.hole)),
@@ -66,7 +73,7 @@ def _outlines(outlines: Iterable[PlanarOutline]) -> tuple[PlanarOutline, ...]:
     return outlines
 
 
-def _read(scene: Any) -> Scene:
+def _read(scene: Any, coherent: Collection[str]) -> Scene:
     """The scene with its bodies, holes and sources, not yet checked."""
     import mitsuba as mi
 
@@ -78,7 +85,7 @@ def _read(scene: Any) -> Scene:
         raise InputError(f"{name}: is a {type(mi_scene).__name__}, no scene of variant {mi.variant()}; give a scene")
     with _in_scene(name):
         shapes = sort_shapes(mi_scene.shapes())
-        found = sources(mi_scene)
+        found = sources(mi_scene, coherent=coherent)
     if shapes.others:
         warnings.warn(f"{', '.join(shapes.others)}: does not diffract yet", GrimaldiWarning, stacklevel=3)
     return Scene(

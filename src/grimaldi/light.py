@@ -1,0 +1,150 @@
+"""The light of all sources at a surface: fields within a group add, then intensities (THEORY eq. 3a)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from hashlib import blake2b
+from typing import Any, NamedTuple
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from grimaldi.coherence import groups, separated
+from grimaldi.conventions import Wavelength, parse_wavelengths
+from grimaldi.diffraction import model
+from grimaldi.diffraction.frame import constant
+from grimaldi.diffraction.model import Receivers
+from grimaldi.errors import InputError
+from grimaldi.options import checked_options
+from grimaldi.propagate import Wave, propagate
+from grimaldi.scene.bodies import vertices
+from grimaldi.scene.model import Scene, Source
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What the integrator `wave` was asked for; see its manual page."""
+
+    wavelength: Wavelength | None = None
+    scene_unit: str | None = None
+    diffraction: str = "boundary"
+    interference: bool = True
+    tolerance: float = 1e-3
+    precision: str = "auto"
+    occlusion: bool = True
+    coherent: tuple[str, ...] = ()
+
+    def check(self) -> None:
+        """Raise InputError for what is wrong whatever the scene."""
+        model(self.diffraction)
+        checked_options(self.tolerance, self.precision)
+
+
+class Beam(NamedTuple):
+    """One source at one wavelength: its place in `Light.keys`, and U at receivers."""
+
+    source: Source
+    key: int
+    wave: Callable[[Receivers], Wave]
+
+
+@dataclass(frozen=True, eq=False)
+class Light:
+    """All beams of a scene; `keys` are the pairs (wavelength, group) whose intensities add."""
+
+    scene: Scene
+    beams: tuple[Beam, ...]
+    keys: tuple[tuple[float, str], ...]
+
+    def select(self, names: tuple[str, ...]) -> list[int]:
+        """Where the groups called `names` stand in `keys`, at the first wavelength."""
+        present = [group for _, group in self.keys]
+        for name in names:
+            if name not in present:
+                raise InputError(f"wave: groups names {name!r}; the scene has {', '.join(dict.fromkeys(present))}")
+        return [present.index(name) for name in names]
+
+    def reflected(self, si: Any, bsdf: Any, p: Any, n: Any, active: Any) -> Reflected:
+        """Eq. 3a at surface interactions: radiance towards the camera, and U of each key."""
+        context = mi.BSDFContext()
+        zero = type(p.x)(0)
+        real, imag, error = ([zero] * len(self.keys) for _ in range(3))
+        amplitudes = [(mi.UnpolarizedSpectrum(0), mi.UnpolarizedSpectrum(0)) for _ in self.keys]
+        for beam in self.beams:
+            u = beam.wave(Receivers(p, n, active))
+            wo = si.to_local(toward(beam.source, si.p))
+            f = mi.unpolarized_spectrum(bsdf.eval(context, si, wo, active))
+            weight = dr.sqrt(dr.maximum(f, 0) * _tint(beam.source))
+            k = beam.key
+            re, im = amplitudes[k]
+            amplitudes[k] = (
+                dr.fma(weight, mi.Float(u.real), re),
+                dr.fma(weight, mi.Float(u.imag), im),
+            )
+            real[k], imag[k], error[k] = real[k] + u.real, imag[k] + u.imag, error[k] + u.error
+        L = sum((re * re + im * im for re, im in amplitudes), mi.UnpolarizedSpectrum(0))
+        return Reflected(L, real, imag, error)
+
+
+class Reflected(NamedTuple):
+    """Radiance, and for each key U and its error, at surface interactions."""
+
+    L: Any
+    real: list[Any]
+    imag: list[Any]
+    error: list[Any]
+
+
+def prepare(scene: Scene, settings: Settings) -> Light:
+    """Find each source's outlines; the result is pure data and functions of points.
+
+    Raises InputError where the wavelength is missing or wrong.
+    """
+    if settings.wavelength is None:
+        raise InputError(f"{scene.name}: no wavelength; give one, such as wavelength=0.5 in scene units")
+    wavelengths = parse_wavelengths(settings.wavelength, settings.scene_unit or scene.unit)
+    options = checked_options(settings.tolerance, settings.precision, settings.occlusion)
+    factor = model(settings.diffraction)
+    sources = scene.sources if settings.interference else separated(scene.sources)
+    keys = tuple((wavelength, group) for wavelength in wavelengths for group in groups(sources))
+    beams = tuple(
+        Beam(
+            source,
+            keys.index((wavelength, source.group)),
+            propagate(scene, source, factor, 2 * np.pi / wavelength, options),
+        )
+        for wavelength in wavelengths
+        for source in sources
+    )
+    return Light(scene, beams, keys)
+
+
+def toward(source: Source, p: Any) -> Any:
+    """Unit vectors from points to a source."""
+    if source.position is not None:
+        return dr.normalize(constant(mi.Point3f, source.position) - p)
+    assert source.direction is not None
+    return constant(mi.Vector3f, -source.direction)
+
+
+def _tint(source: Source) -> Any:
+    """The light's colour as a weight of the channels."""
+    if dr.size_v(mi.UnpolarizedSpectrum) == 1:
+        return mi.UnpolarizedSpectrum(1)
+    return mi.UnpolarizedSpectrum(*source.tint)
+
+
+def fingerprint(scene: Scene) -> bytes:
+    """Changes when a body or a source does."""
+    digest = blake2b(digest_size=16)
+    for body in scene.bodies:
+        digest.update(np.ascontiguousarray(vertices(body.geometry)).tobytes())
+    for planar in scene.screen:
+        digest.update(np.concatenate([*planar.loops, planar.to_world[:, :2]], axis=None).tobytes())
+    for s in scene.sources:
+        digest.update(repr((s.name, s.group, s.amplitude, s.phase, s.tint)).encode())
+        for v in (s.position, s.direction, s.origin):
+            digest.update(b"-" if v is None else v.tobytes())
+    return digest.digest()

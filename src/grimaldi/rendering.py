@@ -1,0 +1,207 @@
+"""Pictures: the integrator `wave` run tile by tile, with every layer of the result."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from inspect import signature
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from grimaldi.conventions import check_options
+from grimaldi.errors import GrimaldiWarning, InputError
+from grimaldi.options import checked_options, describe
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from grimaldi.engine.tiles import Shot, Tile
+    from grimaldi.light import Light, Settings
+    from grimaldi.scene.model import Scene
+
+
+def render(
+    scene: Any,
+    *,
+    wavelength: Any = None,
+    scene_unit: str | None = None,
+    spp: int | None = None,
+    seed: int = 0,
+    size: tuple[int, int] | None = None,
+    diffraction: str | None = None,
+    interference: bool | None = None,
+    tolerance: float | None = None,
+    precision: Literal["auto", "double"] | None = None,
+    occlusion: bool | None = None,
+    max_depth: int | None = None,
+    **unknown: Any,
+) -> xr.Dataset:
+    """Render a scene with interference and diffraction.
+
+    What is left out comes from the scene's own integrator where that is `wave`, and from its sensor and film.
+    Samples are independent and pixels are boxes, whatever the film's filter: the same seed gives the same picture
+    bit for bit on one type of CPU.
+
+    Args:
+        scene: path, dict, `mi.Scene`, name of a built-in scene, or what `grimaldi.load` returned.
+        wavelength, scene_unit, diffraction, interference, tolerance, precision, occlusion: as in `grimaldi.field`.
+        spp: samples a pixel.
+        seed: of the random numbers.
+        size: (width, height) in pixels.
+        max_depth: longest path from the camera; 2 is direct light, -1 no limit.
+
+    Returns:
+        Dataset with `picture` float32 (y, x, channel), linear radiance; `U` complex64 (wavelength, group, y, x), the
+        mean field at what each pixel sees first (0 where it sees nothing), in units of √irradiance; `intensity`
+        float32 (y, x), the mean of eq. 3; `error` float32 (wavelength, group, y, x), the mean estimated error of U.
+
+    Raises:
+        InputError: one line naming what is wrong and what to do; without a wavelength it suggests one.
+
+    Warns:
+        GrimaldiWarning: fringes finer than a pixel; emitters and shapes that do not diffract yet.
+    """
+    from grimaldi.engine.progress import progress
+    from grimaldi.engine.tiles import render_tile, tiles
+    from grimaldi.fringes import warn_of_fine_fringes
+    from grimaldi.light import prepare
+    from grimaldi.scene import load
+    from grimaldi.scene.checking import require_sensor, require_sources
+    from grimaldi.variants import ensure_variant
+
+    check_options(unknown, signature(render).parameters)
+    ensure_variant("rgb")
+    loaded = load(scene, scene_unit=scene_unit)
+    require_sensor(loaded)
+    require_sources(loaded)
+    own = _integrator(loaded)
+    asked = dict(
+        wavelength=wavelength,
+        scene_unit=scene_unit,
+        diffraction=diffraction,
+        interference=interference,
+        tolerance=tolerance,
+        precision=precision,
+        occlusion=occlusion,
+    )
+    settings = replace(_settings(own), **{name: value for name, value in asked.items() if value is not None})
+    settings.check()
+    if settings.coherent:
+        loaded = load(loaded.mitsuba, scene_unit=loaded.unit, coherent=settings.coherent)
+    sensor = loaded.mitsuba.sensors()[0]
+    with _resized(sensor, size):
+        settings = _with_wavelength(settings, loaded, sensor)
+        shot = _shot(sensor, own, spp, seed, max_depth)
+        light = prepare(loaded, settings)
+        warn_of_fine_fringes(loaded, sensor, [wavelength for wavelength, _ in light.keys])
+        done: list[Tile] = []
+        with progress(shot.width * shot.height, "render") as advance:
+            for first, pixels in tiles(shot):
+                done.append(render_tile(light, sensor, shot, first, pixels))
+                advance(pixels)
+    return _dataset(loaded, light, settings, shot, done)
+
+
+def _integrator(scene: Scene) -> Any:
+    """The scene's own integrator if it is `wave`, else None."""
+    own = scene.mitsuba.integrator()
+    return own if hasattr(own, "settings") else None
+
+
+def _settings(own: Any) -> Settings:
+    from grimaldi.light import Settings
+
+    return Settings() if own is None else own.settings
+
+
+def _with_wavelength(settings: Settings, scene: Scene, sensor: Any) -> Settings:
+    """The settings, if they have a wavelength; else an InputError that suggests one."""
+    from grimaldi.fringes import suggested_wavelength
+
+    if settings.wavelength is not None:
+        return settings
+    suggestion = suggested_wavelength(scene, sensor)
+    advice = "give one" if suggestion is None else f"try {suggestion:.2g}, whose fringes are about four pixels wide"
+    raise InputError(f"{scene.name}: no wavelength; {advice} (wavelength=…, --wavelength …, in scene units)")
+
+
+@contextmanager
+def _resized(sensor: Any, size: tuple[int, int] | None) -> Iterator[None]:
+    """The sensor with a film of another size, put back afterwards."""
+    import mitsuba as mi
+
+    if size is None:
+        yield
+        return
+    if len(size) != 2 or min(size) < 1 or int(size[0]) * int(size[1]) > 2**28:
+        raise InputError(f"size: {size!r} is no film size; give (width, height) in pixels, at most 2^28 in all")
+    params = mi.traverse(sensor)
+    names = ("film.size", "film.crop_size", "film.crop_offset")
+    before = {name: list(params[name]) for name in names}
+
+    def change(size: Any, crop: Any, offset: Any) -> None:
+        for name, value in zip(names, (size, crop, offset), strict=True):
+            params[name] = mi.ScalarPoint2u(*(int(v) for v in value))
+        params.update()
+
+    change(size, size, (0, 0))
+    try:
+        yield
+    finally:
+        change(*before.values())
+
+
+def _shot(sensor: Any, own: Any, spp: int | None, seed: int, max_depth: int | None) -> Shot:
+    """Film and sampling from the sensor, paths from the `wave` integrator, unless told otherwise."""
+    from grimaldi.engine.tiles import Shot
+
+    width, height = (int(v) for v in sensor.film().crop_size())
+    count = sensor.sampler().sample_count() if spp is None else spp
+    if not isinstance(count, int) or isinstance(count, bool) or not 1 <= count <= 1 << 20:
+        raise InputError(f"spp: {count!r} is no number of samples; give 1 or more, such as 16")
+    if not isinstance(seed, int) or isinstance(seed, bool) or not 0 <= seed < 1 << 32:
+        raise InputError(f"seed: {seed!r} is no seed; give an integer from 0 to 2^32 - 1")
+    depth = max_depth if max_depth is not None else (own.max_depth if own is not None else 2)
+    if not isinstance(depth, int) or depth < -1:
+        raise InputError(f"max_depth: {depth!r} is no path length; give 2 for direct light, -1 for no limit")
+    rr_depth, hidden = (own.rr_depth, own.hidden) if own is not None else (5, False)
+    return Shot(width, height, count, seed, depth, rr_depth, hidden)
+
+
+def _dataset(scene: Scene, light: Light, settings: Settings, shot: Shot, done: list[Tile]) -> xr.Dataset:
+    """The tiles side by side, with their coordinates and a description."""
+    import xarray as xr
+
+    wavelengths = tuple(dict.fromkeys(wavelength for wavelength, _ in light.keys))
+    names = tuple(dict.fromkeys(group for _, group in light.keys))
+    image = shot.height, shot.width
+    layers = len(wavelengths), len(names), *image
+    picture = np.concatenate([tile.picture for tile in done], axis=1)
+    channels = {1: ["L"], 3: ["R", "G", "B"]}[len(picture)]
+    data = {
+        "picture": (("y", "x", "channel"), np.moveaxis(picture.reshape(-1, *image), 0, 2)),
+        "U": (
+            ("wavelength", "group", "y", "x"),
+            np.concatenate([tile.U for tile in done], axis=1).astype(np.complex64).reshape(layers),
+        ),
+        "intensity": (("y", "x"), np.concatenate([tile.intensity for tile in done]).reshape(image)),
+        "error": (
+            ("wavelength", "group", "y", "x"),
+            np.concatenate([tile.error for tile in done], axis=1).reshape(layers),
+        ),
+    }
+    coords = {"wavelength": list(wavelengths), "group": list(names), "channel": channels}
+    lost = sum(tile.lost for tile in done)
+    if lost:
+        warnings.warn(f"{lost} samples were not finite and are left out", GrimaldiWarning, stacklevel=3)
+    attrs = describe(
+        scene,
+        diffraction=settings.diffraction,
+        interference=settings.interference,
+        options=checked_options(settings.tolerance, settings.precision, settings.occlusion),
+    )
+    attrs |= {"wavelength": list(wavelengths), "spp": shot.spp, "seed": shot.seed, "non_finite": lost}
+    return xr.Dataset(data, coords, attrs)
