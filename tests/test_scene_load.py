@@ -357,12 +357,13 @@ def test_what_a_screen_cannot_be_combined_with_yet(parts, says):
         grimaldi.load(shapes(lamp=LAMP, slit=hole(), **parts))
 
 
-def test_a_plane_wave_is_hidden_along_its_direction():
-    light = {"type": "coherent_directional", "direction": [1, 0, 1]}
-    aside = at("sphere", 0, 0, BEFORE)
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_a_plane_wave_is_hidden_along_its_direction(side):
+    light = {"type": "coherent_directional", "direction": [1, 0, -side]}
+    aside, in_front = at("sphere", 0, 0, 5 * side), at("sphere", -5, 0, 5 * side)
     assert grimaldi.load(shapes(light=light, slit=hole(), ball=aside)).holes
     with pytest.raises(NotYet, match="ball: a body between source and aperture"):
-        grimaldi.load(shapes(light=light, slit=hole(), ball=at("sphere", BEFORE, 0, BEFORE)))
+        grimaldi.load(shapes(light=light, slit=hole(), ball=in_front))
 
 
 @pytest.mark.parametrize(
