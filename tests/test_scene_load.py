@@ -320,7 +320,13 @@ BEFORE, BEHIND = -5.0, 5.0  # the source is at z = -10, the screen at z = 0
         },
         {"ball": at("sphere", 4, 0, BEFORE)},
         {"box": at("cube", 0, 4, BEFORE)},
-        {"behind": at("cube", 0, 0, -20)},
+        {"behind": at("sphere", 0, 0, -13)},
+        {  # passes below the cone and above the source's back
+            "awning": {
+                "type": "rectangle",
+                "to_world": transform().translate([0, 0.9, -15.5]).rotate([1, 0, 0], 101.3).scale([9, 14.7, 1]),
+            }
+        },
         {"beside": at("rectangle", 0, -2, -20, scale=[9, 1, 1]), "wall": at("disk", 0, 0, BEHIND)},
         {"second": hole(to_world=transform().translate([3, 0, 0]))},
     ],
