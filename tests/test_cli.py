@@ -176,7 +176,7 @@ def test_render_writes_every_output_of_one_computation(tmp_path: Path, scene: Pa
 
 
 def test_outline_needs_the_source_named_among_several(tmp_path: Path, scene: Path) -> None:
-    assert "name one with --source" in said(command("outline", scene, "-o", tmp_path / "out.svg"))
+    assert "name one of coherent_point, " in said(command("outline", scene, "-o", tmp_path / "out.svg"))
     assert "no source 'lamp'" in said(command("outline", scene, "--source", "lamp", "-o", tmp_path / "out.svg"))
 
 

@@ -7,6 +7,8 @@ import sys
 from grimaldi.cli.messages import fail, one_line_each
 from grimaldi.errors import InputError
 
+INTERRUPTED = 130
+
 
 def main() -> None:
     """Run the command line and exit: 0 done, 2 wrong input (one line), 130 interrupted, 1 anything else."""
@@ -21,7 +23,10 @@ def _run(arguments: list[str]) -> int:
         from grimaldi.cli.app import app
 
         try:
-            return app(arguments or ["--help"], prog_name="grimaldi", standalone_mode=False) or 0
+            code = app(arguments or ["--help"], prog_name="grimaldi", standalone_mode=False) or 0
+            if code == INTERRUPTED:  # typer takes Ctrl-C for itself, and says nothing
+                raise KeyboardInterrupt
+            return code
         except InputError as error:
             return fail(error, 2)
         except typer.TyperException as error:
@@ -31,4 +36,4 @@ def _run(arguments: list[str]) -> int:
         except MemoryError:
             return fail("out of memory: ask for fewer points, pixels or samples at once", 1)
     except KeyboardInterrupt:
-        return fail("interrupted", 130)
+        return fail("interrupted", INTERRUPTED)
