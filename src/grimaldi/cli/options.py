@@ -25,7 +25,7 @@ SceneUnit = Annotated[
     typer.Option(help="Length of one scene unit ('1 um'); for wavelengths with a unit.", metavar="LENGTH"),
 ]
 Diffraction = Annotated[
-    Literal["none", "boundary", "huygens", "area"] | None,
+    Literal["none", "boundary"] | None,
     typer.Option(help="The model of diffraction.  [default: boundary]"),
 ]
 Interference = Annotated[
