@@ -8,11 +8,11 @@ from grimaldi.scene.builtin.bench import GREEN, bench
 
 
 def build(
-    separation: float = 0.5, distance: float = 1000.0, wavelength: float = GREEN, width: float = 16.0
+    separation: float = 1.0, distance: float = 1000.0, wavelength: float = GREEN, width: float = 8.0
 ) -> dict[str, Any]:
     """Two sources `separation` s apart along x, `distance` L from a screen of which `width` is seen [mm].
 
-    Bright fringes along y are λL/s apart: by default 1.064 mm, which is 34 of 512 pixels and 15 fringes.
+    Bright fringes along y are λL/s apart: by default 0.532 mm, which is 34 of 512 pixels and 15 fringes.
     A bright one is in the middle. Their intensity is 4A²/L² = 1 and that between them 0.
     """
     sources = {
