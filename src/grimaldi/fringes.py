@@ -8,15 +8,14 @@ from itertools import combinations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from grimaldi.camera import seen
 from grimaldi.errors import GrimaldiWarning
 from grimaldi.outlines.extract import outline
 from grimaldi.outlines.model import Reals
 from grimaldi.scene.model import Scene
 
 WANTED = 4.0  # pixels that a suggested wavelength's fringes take
-GRID = 32  # rays across the film
 
 
 def suggested_wavelength(scene: Scene, sensor: Any) -> float | None:
@@ -44,7 +43,7 @@ def _scales(scene: Scene, sensor: Any) -> Iterator[tuple[float, float]]:
     Behind an edge the first fringe takes √(λ z2 (z1+z2)/z1), z1 and z2 the distances from the edge to the source and
     to the surface; two sources of one group make fringes λ/α apart, α the angle between them.
     """
-    points, pixel = _seen(sensor, scene)
+    points, pixel = seen(scene, sensor)
     if not len(points):
         return
     for source in scene.sources:
@@ -67,24 +66,3 @@ def _direction(source: Any, points: Reals) -> Reals:
         return np.broadcast_to(source.direction, points.shape)
     d = points - source.position
     return d / np.linalg.norm(d, axis=1, keepdims=True)
-
-
-def _seen(sensor: Any, scene: Scene) -> tuple[Reals, NDArray[np.float64]]:
-    """Points (n, 3) that the camera sees on a coarse grid, and a pixel's width there (n,)."""
-    import drjit as dr
-    import mitsuba as mi
-
-    width, height = (int(v) for v in sensor.film().crop_size())
-    x, y = dr.meshgrid(*(dr.arange(mi.Float, GRID) / GRID + 0.5 / GRID for _ in range(2)))
-
-    def hits(shift: float) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-        ray, _ = sensor.sample_ray_differential(0.0, 0.5, mi.Point2f(x + shift / width, y), mi.Point2f(0.5))
-        si = scene.mitsuba.ray_intersect(ray)
-        return np.array(si.p, np.float64).T, np.array(si.is_valid())
-
-    here, met = hits(0.0)
-    beside, met_too = hits(1.0)
-    both = met & met_too
-    pixel = np.linalg.norm(here - beside, axis=1)
-    keep = both & (pixel > 0)
-    return here[keep], pixel[keep]

@@ -11,6 +11,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from grimaldi.camera import seen
 from grimaldi.coherence import groups, separated
 from grimaldi.conventions import Wavelength, parse_wavelengths
 from grimaldi.diffraction import model
@@ -97,8 +98,8 @@ class Reflected(NamedTuple):
     error: list[Any]
 
 
-def prepare(scene: Scene, settings: Settings) -> Light:
-    """Find each source's outlines; the result is pure data and functions of points.
+def prepare(scene: Scene, settings: Settings, sensor: Any) -> Light:
+    """Find each source's outlines for what `sensor` sees; the result is pure data and functions of points.
 
     Raises InputError where the wavelength is missing or wrong.
     """
@@ -107,13 +108,14 @@ def prepare(scene: Scene, settings: Settings) -> Light:
     wavelengths = parse_wavelengths(settings.wavelength, settings.scene_unit or scene.unit)
     options = checked_options(settings.tolerance, settings.precision, settings.occlusion)
     factor = model(settings.diffraction)
+    where, _ = seen(scene, sensor)
     sources = scene.sources if settings.interference else separated(scene.sources)
     keys = tuple((wavelength, group) for wavelength in wavelengths for group in groups(sources))
     beams = tuple(
         Beam(
             source,
             keys.index((wavelength, source.group)),
-            propagate(scene, source, factor, 2 * np.pi / wavelength, options),
+            propagate(scene, source, factor, 2 * np.pi / wavelength, options, where),
         )
         for wavelength in wavelengths
         for source in sources

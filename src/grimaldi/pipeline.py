@@ -75,7 +75,7 @@ def field(
     with progress(len(wavelengths) * len(sources) * len(p), "field") as advance:
         for i, length in enumerate(wavelengths):
             for source in sources:
-                wave = propagate(loaded, source, factor, 2 * np.pi / length, options)
+                wave = propagate(loaded, source, factor, 2 * np.pi / length, options, p)
                 of = i, names.index(source.group)
                 for block, u, du in at_points(wave, loaded, source, p):
                     U[*of, block] += u

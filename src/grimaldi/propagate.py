@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from grimaldi.diffraction.frame import incident
 from grimaldi.diffraction.model import Model, Options, Receivers
-from grimaldi.outlines.extract import outline
+from grimaldi.outlines.extract import curve, outline
+from grimaldi.outlines.model import Reals
 from grimaldi.scene.model import Scene, Source
-
-SAG = 0.25  # of tolerance/k: Δ changes by at most twice the sag, and its mean over a polygon's sides vanishes
 
 
 class Wave(NamedTuple):
@@ -21,12 +22,15 @@ class Wave(NamedTuple):
     error: Any
 
 
-def propagate(scene: Scene, source: Source, model: Model, k: float, options: Options) -> Callable[[Receivers], Wave]:
+def propagate(
+    scene: Scene, source: Source, model: Model, k: float, options: Options, where: Reals
+) -> Callable[[Receivers], Wave]:
     """Find what stands in the source's light; return U (eq. 1-2 times M) as a function of receivers.
 
-    k: wavenumber [1/scene unit]. The function is pure and can be traced inside a larger kernel.
+    k: wavenumber [1/scene unit]; where (n, 3): some of the points where the field will be asked. The function is
+    pure and can be traced inside a larger kernel.
     """
-    seen = outline(scene, source, sag=SAG * options.tolerance / k)
+    seen = outline(scene, source, sag=_sags(scene, source, options.tolerance / k, where))
     factor = model(scene, source, seen, k, options)
 
     def wave(receivers: Receivers) -> Wave:
@@ -37,3 +41,16 @@ def propagate(scene: Scene, source: Source, model: Model, k: float, options: Opt
         return Wave(modulus * (cos * re - sin * im), modulus * (cos * im + sin * re), modulus * F(m.error))
 
     return wave
+
+
+def _sags(scene: Scene, source: Source, path: float, where: Reals) -> list[float]:
+    """How coarse each curve's polygon may be for Δ to err by `path`: |∇Δ| <= ρ/z1 + ρ/z2 across the ray."""
+    sags = []
+    for shape in scene.screen or [body.geometry for body in scene.bodies]:
+        centre, radius = curve(shape)
+        distances = [np.linalg.norm(where - centre, axis=1).min(initial=np.inf)]
+        if source.position is not None:
+            distances.append(np.linalg.norm(source.position - centre))
+        slope = sum(radius / max(0.5 * d, 0.5 * radius) for d in distances)
+        sags.append(float(min(path / slope, 0.01 * radius)))
+    return sags

@@ -78,15 +78,15 @@ def render(
     require_sensor(loaded)
     require_sources(loaded)
     own = _integrator(loaded)
-    asked = dict(
-        wavelength=wavelength,
-        scene_unit=scene_unit,
-        diffraction=diffraction,
-        interference=interference,
-        tolerance=tolerance,
-        precision=precision,
-        occlusion=occlusion,
-    )
+    asked = {
+        "wavelength": wavelength,
+        "scene_unit": scene_unit,
+        "diffraction": diffraction,
+        "interference": interference,
+        "tolerance": tolerance,
+        "precision": precision,
+        "occlusion": occlusion,
+    }
     settings = replace(_settings(own), **{name: value for name, value in asked.items() if value is not None})
     settings.check()
     if settings.coherent:
@@ -95,7 +95,7 @@ def render(
     with _resized(sensor, size):
         settings = _with_wavelength(settings, loaded, sensor)
         shot = _shot(sensor, own, spp, seed, max_depth)
-        light = prepare(loaded, settings)
+        light = prepare(loaded, settings, sensor)
         warn_of_fine_fringes(loaded, sensor, [wavelength for wavelength, _ in light.keys])
         done: list[Tile] = []
         with progress(shot.width * shot.height, "render") as advance:

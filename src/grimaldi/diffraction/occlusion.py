@@ -12,7 +12,6 @@ from grimaldi.diffraction.frame import constant
 from grimaldi.diffraction.table import Piece
 from grimaldi.scene.model import Mesh, Scene, Source, Sphere
 
-
 GRAZING = 1e-3  # rad: Float32 rays along a face at x hit it or not, as rounding goes
 
 

@@ -8,13 +8,15 @@ from grimaldi.outlines.model import Outline
 from grimaldi.scene.model import Source
 
 
-def outline(scene: Any, source: Source | str | None = None, *, sag: float | None = None) -> Outline:
+def outline(scene: Any, source: Source | str | None = None) -> Outline:
     """The lit outlines that a source of a scene sees.
 
     Args:
         scene: whatever `grimaldi.load` takes.
         source: a source of the scene or its name; may be left out where there is only one.
-        sag: how far the polygon of a smooth outline may lie from it [scene units]; 1e-4 of its size by default.
+
+    Returns:
+        The outline as segments; of smooth shapes a polygon within 1e-4 of their size.
 
     Raises:
         InputError: the scene is wrong, or has no such source.
@@ -24,4 +26,4 @@ def outline(scene: Any, source: Source | str | None = None, *, sag: float | None
     from grimaldi.scene.sources import pick_source
 
     loaded = load(scene)
-    return extract(loaded, source if isinstance(source, Source) else pick_source(loaded, source), sag=sag)
+    return extract(loaded, source if isinstance(source, Source) else pick_source(loaded, source))

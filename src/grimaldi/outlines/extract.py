@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from grimaldi.outlines import disk, mesh, planar, sphere
@@ -9,34 +11,57 @@ from grimaldi.outlines.candidate import Candidates, toward
 from grimaldi.outlines.hidden import Queries, behind
 from grimaldi.outlines.lit import Stretches, lit_parts
 from grimaldi.outlines.model import Integers, Outline, Reals
-from grimaldi.scene.model import Body, Mesh, Scene, Source, Sphere
+from grimaldi.scene.model import Body, Geometry, Mesh, Scene, Source, Sphere
+from grimaldi.scene.planar import PlanarOutline
 
 LONGEST = 1 / 32  # of the outlines' extent: how finely X→P visibility is told along a straight edge
 DEFAULT_SAG = 1e-4  # of a curve's size, where no wavelength sets it
 
 
-def outline(scene: Scene, source: Source, *, sag: float | None = None) -> Outline:
+def outline(scene: Scene, source: Source, *, sag: Sequence[float] | None = None) -> Outline:
     """The lit outlines that `source` sees.
 
     Args:
         scene: a loaded scene.
         source: one of its sources.
-        sag: how far the polygon of a smooth outline may lie from it [scene units]; 1e-4 of its size by default.
+        sag: for each of the scene's bodies, or of its planar outlines, how far the polygon of a smooth outline
+            may lie from it [scene units]; 1e-4 of its size by default.
 
     Returns:
         All lit silhouettes over the full sphere of directions, also those in front of other lit parts
         (THEORY 2); of planar holes and masks the whole loops. Empty where nothing stands in the light.
     """
     if scene.screen:
-        return _planar(scene, source, sag)
-    parts = [_silhouette(body, source, sag) for body in scene.bodies]
+        return _planar(scene, source, sag or [DEFAULT_SAG * curve(shape)[1] for shape in scene.screen])
+    sag = sag or [DEFAULT_SAG * curve(body.geometry)[1] for body in scene.bodies]
+    parts = [_silhouette(body, source, s) for body, s in zip(scene.bodies, sag, strict=True)]
     if not any(len(part.start) for part in parts):
         return Outline.empty()
     body = np.repeat(np.arange(len(parts)), [len(part.start) for part in parts])
     edges = Candidates.concatenate(parts)
     extents = np.array([np.linalg.norm(np.ptp(part.start, axis=0)) if len(part.start) else 0.0 for part in parts])
     lit = lit_parts(scene.bodies, source, edges, body, LONGEST * extents[body])
-    return _assemble(edges, body, lit, _behind(scene.bodies, source, edges, body, lit), source, _sag(scene.bodies, sag))
+    coarsest = max((s for b, s in zip(scene.bodies, sag, strict=True) if not isinstance(b.geometry, Mesh)), default=0.0)
+    return _assemble(edges, body, lit, _behind(scene.bodies, source, edges, body, lit), source, coarsest)
+
+
+def curve(shape: Geometry | PlanarOutline) -> tuple[Reals, float]:
+    """Centre (3,) and size of a shape's outline: what the sag of its polygon is measured against."""
+    if isinstance(shape, Sphere):
+        return shape.centre, shape.radius
+    if isinstance(shape, Mesh):
+        low, high = shape.vertices.min(axis=0), shape.vertices.max(axis=0)
+        return 0.5 * (low + high), 0.5 * float(np.linalg.norm(high - low))
+    return shape.to_world[:3, 3], float(np.linalg.norm(shape.to_world[:3, :2]))
+
+
+def _silhouette(body: Body, source: Source, sag: float) -> Candidates:
+    geometry = body.geometry
+    if isinstance(geometry, Mesh):
+        return mesh.silhouette(geometry, source)
+    if isinstance(geometry, Sphere):
+        return sphere.silhouette(geometry, source, sag)
+    return disk.silhouette(geometry, source, sag)
 
 
 def _behind(bodies: tuple[Body, ...], source: Source, edges: Candidates, body: Integers, lit: Stretches) -> Reals:
@@ -71,16 +96,15 @@ def _sag(bodies: tuple[Body, ...], sag: float | None) -> float:
     return sag or DEFAULT_SAG * max(sizes)
 
 
-def _planar(scene: Scene, source: Source, sag: float | None) -> Outline:
+def _planar(scene: Scene, source: Source, sag: Sequence[float]) -> Outline:
     parts, number = [], []
-    for i, shape in enumerate(scene.screen):
-        size = float(np.linalg.norm(shape.to_world[:3, :2]))
-        for loop in planar.loops(shape, source, sag or DEFAULT_SAG * size):
+    for i, (shape, s) in enumerate(zip(scene.screen, sag, strict=True)):
+        for loop in planar.loops(shape, source, s):
             parts.append(loop)
             number.append(np.full(len(loop.start), -1 - i))
     edges = Candidates.concatenate(parts)
     n = len(edges.start)
-    return _assemble(edges, np.concatenate(number), Stretches.whole(n), np.full(n, np.inf), source, sag or 0.0)
+    return _assemble(edges, np.concatenate(number), Stretches.whole(n), np.full(n, np.inf), source, max(sag))
 
 
 def _assemble(edges: Candidates, body: Integers, lit: Stretches, behind: Reals, source: Source, sag: float) -> Outline:

@@ -36,8 +36,9 @@ class Stretches:
 def lit_parts(bodies: tuple[Body, ...], source: Source, edges: Candidates, body: Integers, longest: Reals) -> Stretches:
     """What the source reaches of the candidates, in order along them.
 
-    body (n,): whose edges they are; longest (n,): no stretch of an edge comes out longer than this. Whether the source reaches an edge changes only where it passes behind another
-    outline (found exactly, by the signs of determinants) or runs into a surface (by bisection between samples).
+    body (n,): whose edges they are; longest (n,): no stretch of an edge comes out longer than this. Whether the
+    source reaches an edge changes only where it passes behind another outline (found exactly, by the signs of
+    determinants) or runs into a surface (by bisection between samples).
     """
     all_ = _between_cuts(len(edges.start), *_crossings(source, edges))
 

@@ -104,7 +104,7 @@ def register(V: Any) -> None:
             if key not in self.lights:
                 for warning in said:
                     warnings.warn(warning.message, stacklevel=2)
-                self.lights = {key: prepare(loaded, self.settings)}
+                self.lights = {key: prepare(loaded, self.settings, loaded.mitsuba.sensors()[0])}
             return self.lights[key]
 
         def aov_names(self) -> list[str]:
