@@ -114,7 +114,7 @@ def test_a_mirrored_plate_is_the_same_plate(matrix):
 def test_a_mirrored_body_is_the_same_body(kind):
     plain = factor(ASIDE, BEHIND, shape(kind, affine(8)), tolerance=1e-5)
     assert abs(plain - 1).max() > 0.5
-    for mirror in ((-8, 8, 8), (8, 8, -8), (-8, -8, -8)):
+    for mirror in ((-8, 8, 8), (-8, -8, -8)):
         mirrored = factor(ASIDE, BEHIND, shape(kind, affine(mirror)), tolerance=1e-5)
         np.testing.assert_allclose(mirrored, plain, rtol=0, atol=2e-5)
 
