@@ -41,7 +41,7 @@ def bench(wavelength: float, width: float, camera: float, parts: dict[str, Any])
             "type": "orthographic",
             "to_world": T().look_at([0, 0, camera], [0, 0, 0], [0, 1, 0]).scale([width / 2, width / 2, 1]),
             "film": film(PIXELS, PIXELS),
-            "sampler": {"type": "independent", "sample_count": 16},
+            "sampler": {"type": "independent", "sample_count": 4},
         },
     }
 
