@@ -67,8 +67,8 @@ def main() -> None:
                 "segments lit": sum(lit.values()),
                 "first run [s]": f"{first:.1f}",
                 "grimaldi [s]": f"{statistics.median(ours):.1f}",
-                "direct [s]": f"{statistics.median(theirs):.2f}",
-                "ratio": f"{statistics.median(ours) / statistics.median(theirs):.0f}",
+                "direct [s]": f"{statistics.median(theirs):.3g}",
+                "ratio": f"{statistics.median(ours) / statistics.median(theirs):.3g}",
             }
         )
     print(
