@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from grimaldi.camera import seen
+from grimaldi.camera import View, seen
 from grimaldi.errors import GrimaldiWarning
 from grimaldi.outlines.extract import outline
 from grimaldi.outlines.model import Reals
@@ -43,14 +43,15 @@ def _scales(scene: Scene, sensor: Any) -> Iterator[tuple[float, float]]:
     Behind an edge the first fringe takes √(λ z2 (z1+z2)/z1), z1 and z2 the distances from the edge to the source and
     to the surface; two sources of one group make fringes λ/α apart, α the angle between them.
     """
-    points, pixel = seen(scene, sensor)
+    view = seen(scene, sensor)
+    points, pixel = view.points, view.pixel
     if not len(points):
         return
     for source in scene.sources:
-        edges = outline(scene, source)
+        edges = _above(outline(scene, source).start, view)
         if not len(edges):
             continue
-        centre = edges.start.mean(axis=0)
+        centre = edges.mean(axis=0)
         z2 = np.linalg.norm(points - centre, axis=1)
         z1 = np.inf if source.position is None else float(np.linalg.norm(centre - source.position))
         yield float(np.median(np.sqrt(z2 * (1 + z2 / z1)) / pixel)), 0.5
@@ -59,6 +60,13 @@ def _scales(scene: Scene, sensor: Any) -> Iterator[tuple[float, float]]:
             angle = np.linalg.norm(_direction(a, points) - _direction(b, points), axis=1)
             if (angle > 0).any():
                 yield float(np.median(1 / (angle[angle > 0] * pixel[angle > 0]))), 1.0
+
+
+def _above(x: Reals, view: View) -> Reals:
+    """The points x (n, 3) that rise above the horizon of at least half of what the camera sees: others do not act."""
+    rise = np.einsum("ik,jk->ij", view.normals, x) - np.einsum("ik,ik->i", view.normals, view.points)[:, None]
+    far = 1e-3 * np.linalg.norm(x[None] - view.points[:, None], axis=2)
+    return x[(rise > far).mean(axis=0) >= 0.5]
 
 
 def _direction(source: Any, points: Reals) -> Reals:

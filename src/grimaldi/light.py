@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from hashlib import blake2b
@@ -108,7 +109,7 @@ def prepare(scene: Scene, settings: Settings, sensor: Any) -> Light:
     wavelengths = parse_wavelengths(settings.wavelength, settings.scene_unit or scene.unit)
     options = checked_options(settings.tolerance, settings.precision, settings.occlusion)
     factor = model(settings.diffraction)
-    where, _ = seen(scene, sensor)
+    where = seen(scene, sensor).points
     sources = scene.sources if settings.interference else separated(scene.sources)
     keys = tuple((wavelength, group) for wavelength in wavelengths for group in groups(sources))
     beams = tuple(
@@ -121,6 +122,31 @@ def prepare(scene: Scene, settings: Settings, sensor: Any) -> Light:
         for source in sources
     )
     return Light(scene, beams, keys)
+
+
+class LightOf:
+    """The light of a Mitsuba scene, prepared anew when its bodies or sources have changed.
+
+    A plain object, so that Mitsuba does not look for parameters in it.
+    """
+
+    def __init__(self, settings: Settings) -> None:
+        self.settings = settings
+        self._key = b""
+        self._light: Light | None = None
+
+    def __call__(self, scene: Any) -> Light:
+        from grimaldi.scene import load
+
+        with warnings.catch_warnings(record=True) as said:
+            warnings.simplefilter("always")
+            loaded = load(scene, coherent=self.settings.coherent)
+        key = fingerprint(loaded)
+        if self._light is None or key != self._key:
+            for warning in said:
+                warnings.warn(warning.message, stacklevel=2)
+            self._key, self._light = key, prepare(loaded, self.settings, loaded.mitsuba.sensors()[0])
+        return self._light
 
 
 def toward(source: Source, p: Any) -> Any:

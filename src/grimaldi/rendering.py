@@ -108,13 +108,13 @@ def render(
 def _integrator(scene: Scene) -> Any:
     """The scene's own integrator if it is `wave`, else None."""
     own = scene.mitsuba.integrator()
-    return own if hasattr(own, "settings") else None
+    return own if hasattr(own, "light_of") else None
 
 
 def _settings(own: Any) -> Settings:
     from grimaldi.light import Settings
 
-    return Settings() if own is None else own.settings
+    return Settings() if own is None else own.light_of.settings
 
 
 def _with_wavelength(settings: Settings, scene: Scene, sensor: Any) -> Settings:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from typing import Any
 
 from grimaldi.plugins import parameters
@@ -74,13 +73,13 @@ def register(V: Any) -> None:
 
         def __init__(self, props: Any) -> None:
             V.SamplingIntegrator.__init__(self, props)
-            from grimaldi.light import Settings
+            from grimaldi.light import LightOf, Settings
 
             self.max_depth = parameters.depth(props, "max_depth", 2, least=0)
             self.rr_depth = parameters.depth(props, "rr_depth", 5, least=1)
             self.hidden = bool(props.get("hide_emitters", False))
             self.groups = parameters.names(props, "groups")
-            self.settings = Settings(
+            settings = Settings(
                 wavelength=props.get("wavelength", None),
                 scene_unit=props.get("scene_unit", None),
                 diffraction=str(props.get("diffraction", "boundary")),
@@ -89,23 +88,8 @@ def register(V: Any) -> None:
                 precision=str(props.get("precision", "auto")),
                 coherent=parameters.names(props, "coherent"),
             )
-            self.settings.check()
-            self.lights: dict[bytes, Any] = {}
-
-        def light(self, scene: Any) -> Any:
-            """The sources' light in a scene, prepared anew when scene or sources have changed."""
-            from grimaldi.light import fingerprint, prepare
-            from grimaldi.scene import load
-
-            with warnings.catch_warnings(record=True) as said:
-                warnings.simplefilter("always")
-                loaded = load(scene, coherent=self.settings.coherent)
-            key = fingerprint(loaded)
-            if key not in self.lights:
-                for warning in said:
-                    warnings.warn(warning.message, stacklevel=2)
-                self.lights = {key: prepare(loaded, self.settings, loaded.mitsuba.sensors()[0])}
-            return self.lights[key]
+            settings.check()
+            self.light_of = LightOf(settings)
 
         def aov_names(self) -> list[str]:
             return [f"U.{group}.{part}" for group in self.groups for part in ("re", "im")]
@@ -115,7 +99,7 @@ def register(V: Any) -> None:
         ) -> tuple[Any, Any, list[Any]]:
             from grimaldi.tracing import trace
 
-            light = self.light(scene)
+            light = self.light_of(scene)
             chosen = light.select(self.groups)
             path = trace(
                 scene,
@@ -131,6 +115,6 @@ def register(V: Any) -> None:
             return path.L, path.valid, [V.Float(x) for i in chosen for x in (path.real[i], path.imag[i])]
 
         def to_string(self) -> str:
-            return f"Wave[{self.settings}, max_depth={self.max_depth}]"
+            return f"Wave[{self.light_of.settings}, max_depth={self.max_depth}]"
 
     V.register_integrator("wave", Wave)
