@@ -170,6 +170,27 @@ def test_a_floor_under_a_sphere():
     np.testing.assert_allclose(computed[-2:], 1, rtol=0, atol=0.01)
 
 
+@pytest.mark.parametrize("z2", [20.0, 200.0])
+def test_across_the_rim_of_a_spheres_shadow(z2):
+    # Grazing paths: just inside the rim they run along the sphere's own surface.
+    light = oracle.Spherical((0, 0, -80))
+    circle = tangent_circle((0, 0, 0), 4, light)
+    rim = (80 + z2) * np.tan(np.arcsin(4 / 80))
+    x = rim + np.concatenate([np.linspace(-1, 1, 101), np.linspace(-0.01, 0.01, 101)])
+    points = np.stack([0.6 * x, 0.8 * x, 0 * x + z2], axis=1)
+    expected = 1 - oracle.edge_factor(light, points, oracle.circle_edge(circle), 1)
+    computed = factor(light, points, shape("sphere", affine(4)), tolerance=1e-4)
+    np.testing.assert_allclose(computed, expected, rtol=0, atol=1e-3)
+
+
+def test_a_receiver_sees_the_same_whatever_the_others():
+    near, far = np.array([[0, 0, 10.0], [3, 2, 20]]), np.array([[0, 0, 1e4], [30, -400, 1e4]])
+    disc = shape("disk", affine(8))
+    together = factor(PLANE, np.concatenate([near, far]), disc, tolerance=1e-4)
+    apart = [factor(PLANE, points, disc, tolerance=1e-4) for points in (near, far)]
+    np.testing.assert_allclose(together, np.concatenate(apart), rtol=0, atol=2e-4)
+
+
 def test_an_arm_before_a_torso():
     light = oracle.Spherical((0, 0, -400))
     torso = shape("cube", affine(32, at=(0, 0, 32)))
