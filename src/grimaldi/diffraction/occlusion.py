@@ -52,7 +52,9 @@ class Rays(NamedTuple):
         length = dr.norm(d)
         d = d / length
         end = length - 4 * self.epsilon
-        hit = self.blockers.ray_intersect_preliminary(mi.Ray3f(p, d, end, 0, mi.Color0f()), active=active)
+        hit = self.blockers.ray_intersect_preliminary(
+            mi.Ray3f(p, d, end, 0, mi.Color0f()), coherent=True, active=active
+        )
         blocked = hit.is_valid()
         depth = dr.minimum(dr.dot(piece.lit, d), dr.dot(piece.dark, d))  # sine of the angle below the faces at x
         left = end - hit.t
@@ -61,7 +63,7 @@ class Rays(NamedTuple):
         if active & blocked & inside:
             start = hit.t + self.epsilon
             blocked = self.blockers.ray_test(
-                mi.Ray3f(p + start * d, d, end - start, 0, mi.Color0f()), active & (end > start)
+                mi.Ray3f(p + start * d, d, end - start, 0, mi.Color0f()), True, active & (end > start)
             )
         return ~blocked
 

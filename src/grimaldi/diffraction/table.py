@@ -78,6 +78,7 @@ def cut(outline: Outline) -> NDArray[np.int64]:
         if (
             i == 0
             or chain != outline.chain[i - 1]
+            or np.isfinite(outline.behind[i]) != np.isfinite(outline.behind[i - 1])
             or in_piece == LONGEST_PIECE
             or total + length > extent[outline.body[i]] / 64
         ):

@@ -63,13 +63,16 @@ def lit_parts(bodies: tuple[Body, ...], source: Source, edges: Candidates, body:
         borders.append(border)
     borders.append(all_.high)
     for i, state in enumerate(states):
-        parts.append(Stretches(all_.candidate, borders[i], borders[i + 1])[state])
-    joined = _joined(Stretches(*(np.concatenate([getattr(p, f) for p in parts]) for f in ("candidate", "low", "high"))))
-    return _divided(joined, edges, longest)
+        parts.append((np.flatnonzero(state), borders[i][state], borders[i + 1][state]))
+    stretch, low, high = _joined(*(np.concatenate(p) for p in zip(*parts, strict=True)))
+    return _divided(Stretches(all_.candidate[stretch], low, high), edges, longest)
 
 
 def _crossings(source: Source, edges: Candidates) -> tuple[Integers, Reals]:
-    """Where edges pass behind others in the source's view: the farther edge and its parameter there."""
+    """Where edges pass behind others in the source's view: edge and parameter, of the farther and of the nearer one.
+
+    The farther one may be hidden from there on, and behind the nearer one its own body may begin.
+    """
     a, b = view(source, edges.start), view(source, edges.end)
     centres, radii = 0.5 * (a + b), 0.5 * np.linalg.norm(b - a, axis=1)
     scale = 1.0 if not source.is_plane else max(float(np.ptp(centres, axis=0).max()), 1e-300)
@@ -92,7 +95,7 @@ def _crossings(source: Source, edges: Candidates) -> tuple[Integers, Reals]:
     # closer to a point source than x, and on the same side of it
     nearer = ahead > 0 if source.is_plane else (ahead > 0) & (ahead < 1)
     keep = across_i & across_j & nearer
-    return i[keep], t[keep]
+    return np.concatenate([i[keep], j[keep]]), np.concatenate([t[keep], s[keep]])
 
 
 def _cut(source: Source, edges: Candidates, i: Integers, j: Integers) -> tuple[Reals, NDArray[np.bool_]]:
@@ -132,16 +135,14 @@ def _bisect(reached, low: Reals, high: Reals, at_low: NDArray[np.bool_]) -> Real
     return 0.5 * (low + high)
 
 
-def _joined(parts: Stretches) -> Stretches:
-    """Stretches that continue each other made one."""
-    order = np.lexsort((parts.low, parts.candidate))
-    parts = parts[order]
-    if not len(order):
-        return parts
-    follows = (parts.candidate[1:] == parts.candidate[:-1]) & (parts.low[1:] == parts.high[:-1])
-    first = np.flatnonzero(np.append(True, ~follows))
-    last = np.append(first[1:], len(order)) - 1
-    return Stretches(parts.candidate[first], parts.low[first], parts.high[last])
+def _joined(stretch: Integers, low: Reals, high: Reals) -> tuple[Integers, Reals, Reals]:
+    """Intervals low..high of stretches; those that continue each other within one are made one."""
+    order = np.lexsort((low, stretch))
+    stretch, low, high = stretch[order], low[order], high[order]
+    follows = (stretch[1:] == stretch[:-1]) & (low[1:] == high[:-1])
+    first = np.flatnonzero(np.append(True, ~follows)[: len(order)])
+    last = np.append(first[1:], len(order))[: len(first)] - 1
+    return stretch[first], low[first], high[last]
 
 
 def _divided(parts: Stretches, edges: Candidates, longest: Reals) -> Stretches:
