@@ -89,9 +89,7 @@ def test_exposure_takes_the_99th_percentile_of_what_is_lit_to_nine_tenths():
 
 
 def test_srgb_curve():
-    assert encode_srgb([0.0, 0.0031308, 0.214041, 1.0, 7.0]) == pytest.approx(
-        [0.0, 0.04045, 0.5, 1.0, 1.0], abs=1e-5
-    )
+    assert encode_srgb([0.0, 0.0031308, 0.214041, 1.0, 7.0]) == pytest.approx([0.0, 0.04045, 0.5, 1.0, 1.0], abs=1e-5)
     x = np.linspace(0, 1, 101)
     np.testing.assert_allclose(decode_srgb(encode_srgb(x)), x, atol=1e-7)
 
