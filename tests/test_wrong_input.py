@@ -242,6 +242,15 @@ def test_a_lamp_in_a_room_is_no_source_inside_a_body(tmp_path: Path, part):
     assert len(grimaldi.load(tmp_path / "scene.xml").sources) == 1
 
 
+def test_a_box_that_holds_something_else_too_is_a_room():
+    box = {"type": "cube", "to_world": mi.ScalarTransform4f().scale(5.0)}
+    lamp = {"type": "point", "position": [0, 0, 4]}
+    with pytest.raises(InputError, match="inside 'box'"):
+        grimaldi.load({"type": "scene", "box": box, "lamp": lamp})
+    ball = {"type": "sphere", "radius": 0.5}
+    assert len(grimaldi.load({"type": "scene", "box": box, "lamp": lamp, "ball": ball}).sources) == 1
+
+
 @pytest.mark.parametrize(
     ("content", "says"),
     [

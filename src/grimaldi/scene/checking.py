@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from grimaldi.errors import GrimaldiWarning, InputError
-from grimaldi.scene.bodies import faces_inward
+from grimaldi.scene.bodies import faces_inward, vertices
 from grimaldi.scene.messages import where
 from grimaldi.scene.model import Body, Mesh, Scene, Sphere
 from grimaldi.scene.ply import check_ply
@@ -81,7 +81,9 @@ def check_scene(scene: Scene) -> None:
         _check_body(body)
     for source in scene.sources:
         for body in scene.bodies:
-            if source.position is not None and _is_inside(source.position, body, scene.mitsuba):
+            if source.position is None or not _is_inside(source.position, body, scene.mitsuba):
+                continue
+            if not _is_room(body, scene):
                 raise InputError(
                     f"{source.name}: the source lies inside {body.name!r}; move it out, or turn the faces "
                     "inward (flip_normals) if that is a room"
@@ -125,6 +127,13 @@ def _warn_of_shared_edges(mesh: Mesh, name: str) -> None:
             GrimaldiWarning,
             stacklevel=5,
         )
+
+
+def _is_room(body: Body, scene: Scene) -> bool:
+    """Whether a camera or another body is inside as well."""
+    cameras = [np.array(s.world_transform().translation(), np.float64).ravel() for s in scene.mitsuba.sensors()]
+    others = [vertices(other.geometry).mean(axis=0) for other in scene.bodies if other is not body]
+    return any(_is_inside(point, body, scene.mitsuba) for point in cameras + others)
 
 
 def _is_inside(point: Reals, body: Body, mi_scene: Any) -> bool:
