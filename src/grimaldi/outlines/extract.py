@@ -75,27 +75,6 @@ def _behind(bodies: tuple[Body, ...], source: Source, edges: Candidates, body: I
     return result
 
 
-def _silhouette(body: Body, source: Source, sag: float | None) -> Candidates:
-    geometry = body.geometry
-    if isinstance(geometry, Mesh):
-        return mesh.silhouette(geometry, source)
-    if isinstance(geometry, Sphere):
-        return sphere.silhouette(geometry, source, sag or DEFAULT_SAG * geometry.radius)
-    return disk.silhouette(geometry, source, sag or DEFAULT_SAG * float(np.linalg.norm(geometry.to_world[:3, :2])))
-
-
-def _sag(bodies: tuple[Body, ...], sag: float | None) -> float:
-    """The sag of the coarsest curve among the bodies."""
-    sizes = [
-        b.geometry.radius if isinstance(b.geometry, Sphere) else float(np.linalg.norm(b.geometry.to_world[:3, :2]))
-        for b in bodies
-        if not isinstance(b.geometry, Mesh)
-    ]
-    if not sizes:
-        return 0.0
-    return sag or DEFAULT_SAG * max(sizes)
-
-
 def _planar(scene: Scene, source: Source, sag: Sequence[float]) -> Outline:
     parts, number = [], []
     for i, (shape, s) in enumerate(zip(scene.screen, sag, strict=True)):

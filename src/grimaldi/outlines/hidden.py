@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 
 from grimaldi.outlines.candidate import toward
 from grimaldi.outlines.model import Integers, Reals
@@ -30,7 +30,7 @@ def overlaps(
     centres: Reals, radii: Reals, others: Reals, other_radius: float, wide: float
 ) -> tuple[Integers, Integers]:
     """Pairs (i, j) of balls `centres[i]`, `radii[i]` and points `others[j]` within radii[i] + other_radius."""
-    tree = cKDTree(others)
+    tree = KDTree(others)
     small = np.flatnonzero(radii <= wide)
     found = tree.query_ball_point(centres[small], radii[small] + other_radius, return_sorted=False)
     lengths = np.fromiter((len(f) for f in found), np.int64, len(found))
@@ -70,8 +70,11 @@ def hidden(bodies: tuple[Body, ...], source: Source, queries: Queries) -> NDArra
             result[rest] = _by_mesh(body.geometry, source, open_, own, least)
         else:
             other = rest[~own]
-            test = _by_sphere if isinstance(body.geometry, Sphere) else _by_disk
-            result[other] = test(body.geometry, source, queries.x[other], least)
+            x = queries.x[other]
+            if isinstance(body.geometry, Sphere):
+                result[other] = _by_sphere(body.geometry, source, x, least)
+            else:
+                result[other] = _by_disk(body.geometry, source, x, least)
     return result
 
 
