@@ -145,10 +145,11 @@ def body_sum(
     real, imag, err_real, err_imag = F(0), F(0), F(0), F(0)
     nearest2, nearest_segment, nearest_piece = F(dr.inf), U(0), U(0)
     i = U(0)
-    while receivers.active & (i < tab.count):
+    while receivers.active & (i < tab.n_pieces):
         piece = tab.piece(i)
         acts = _acts(fr, piece, n)
         if dr.hint(probe is not None, mode="scalar"):
+            assert probe is not None
             tested = acts & _matters(fr, piece, tab.segment(piece.first).e, k, share)
             if tested:
                 x = mi.Point3f(piece.middle + constant(tab.types.Vector, tab.centre))
@@ -179,7 +180,7 @@ def _crossings(fr: Frame, tab: Table, bend: Any, n: Any, active: Any) -> Any:
     height = dr.norm(q)
     across = dr.cross(fr.a, q / height)
     count, i = F(0), U(0)
-    while active & (i < tab.count):
+    while active & (i < tab.n_pieces):
         piece = tab.piece(i)
         acts = _acts(fr, piece, n)
         j = U(piece.first)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import drjit as dr
-import mitsuba as mi
+import mitsuba
 
 from grimaldi.diffraction.arrays import types
 from grimaldi.diffraction.edges import planar_count
@@ -15,6 +15,8 @@ from grimaldi.diffraction.screen import beyond
 from grimaldi.diffraction.table import table
 from grimaldi.outlines.model import Outline
 from grimaldi.scene.model import Scene, Source
+
+mi: Any = mitsuba  # the stubs refuse numbers where arrays are asked for
 
 
 def none(scene: Scene, source: Source, outline: Outline, k: float, options: Options) -> Evaluate:
@@ -36,17 +38,14 @@ def none(scene: Scene, source: Source, outline: Outline, k: float, options: Opti
 def _lit(scene: Scene, source: Source, receivers: Receivers) -> Any:
     """Mitsuba's own shadow ray (`SurfaceInteraction.spawn_ray_to`), so that `none` equals its `direct`."""
     p = mi.Point3f(receivers.p)
-    if source.is_plane:
+    lift = (1 + dr.max(dr.abs(p))) * mi.math.RayEpsilon
+    if source.position is None:
         assert source.direction is not None
         d = constant(mi.Vector3f, -source.direction)
-    else:
-        assert source.position is not None
-        target = constant(mi.Point3f, source.position)
-        d = target - p
-    lift = (1 + dr.max(dr.abs(p))) * mi.math.RayEpsilon
-    origin = p + dr.mulsign(lift, dr.dot(receivers.n, d)) * receivers.n
-    if source.is_plane:
+        origin = p + dr.mulsign(lift, dr.dot(receivers.n, d)) * receivers.n
         return ~scene.blockers.ray_test(mi.Ray3f(origin, d), receivers.active)
+    target = constant(mi.Point3f, source.position)
+    origin = p + dr.mulsign(lift, dr.dot(receivers.n, target - p)) * receivers.n
     d = target - origin
     distance = dr.norm(d)
     ray = mi.Ray3f(origin, d / distance, distance * (1 - mi.math.ShadowEpsilon), 0, mi.Color0f())

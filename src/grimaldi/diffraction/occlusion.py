@@ -5,12 +5,14 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import drjit as dr
-import mitsuba as mi
+import mitsuba
 import numpy as np
 
 from grimaldi.diffraction.frame import constant
 from grimaldi.diffraction.table import Piece
 from grimaldi.scene.model import Mesh, Scene, Source, Sphere
+
+mi: Any = mitsuba  # the stubs refuse numbers where arrays are asked for
 
 GRAZING = 1e-3  # rad: Float32 rays along a face at x hit it or not, as rounding goes
 

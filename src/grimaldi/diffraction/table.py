@@ -41,7 +41,7 @@ class Table(NamedTuple):
 
     centre: Vector
     size: int  # segments
-    count: int  # pieces
+    n_pieces: int
     segments: Any
     ranges: Any
     pieces: Any
