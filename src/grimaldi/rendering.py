@@ -138,7 +138,7 @@ def _resized(sensor: Any, size: tuple[int, int] | None) -> Iterator[None]:
         return
     if len(size) != 2 or min(size) < 1 or int(size[0]) * int(size[1]) > 2**28:
         raise InputError(f"size: {size!r} is no film size; give (width, height) in pixels, at most 2^28 in all")
-    params = mi.traverse(sensor)
+    params: Any = mi.traverse(sensor)
     names = ("film.size", "film.crop_size", "film.crop_offset")
     before = {name: list(params[name]) for name in names}
 

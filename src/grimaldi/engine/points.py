@@ -39,10 +39,11 @@ def at_points(
 def surface_normals(scene: Scene, source: Source) -> Callable[[Any], Any]:
     """A function of points: the unit normal, towards the source, of the body surface they lie on; 0 elsewhere."""
     import drjit as dr
-    import mitsuba as mi
+    import mitsuba
 
     from grimaldi.diffraction.occlusion import rays
 
+    mi: Any = mitsuba  # the stubs refuse numbers where arrays are asked for
     if scene.blockers is None:
         return lambda p: dr.zeros(mi.Vector3f, dr.width(p))
     probe = rays(scene, source)

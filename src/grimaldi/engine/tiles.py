@@ -11,12 +11,14 @@ from dataclasses import dataclass
 from typing import Any
 
 import drjit as dr
-import mitsuba as mi
+import mitsuba
 import numpy as np
 from numpy.typing import NDArray
 
 from grimaldi.light import Light
 from grimaldi.tracing import trace
+
+mi: Any = mitsuba  # the stubs refuse numbers where arrays are asked for
 
 RAYS = 1 << 16  # of a tile: about a second of work
 
@@ -120,7 +122,7 @@ def render_tile(light: Light, sensor: Any, shot: Shot, first: int, pixels: int) 
     for re, im in zip(path.real, path.imag, strict=True):
         power += re * re + im * im
     intensity = mean(power, seen)
-    lost = dr.count(~finite)
+    lost: Any = dr.count(~finite)
     dr.eval(picture, real, imag, error, intensity, lost)
     return Tile(
         first,
