@@ -50,7 +50,7 @@ def test_the_camera_sees_nothing_but_the_screen_and_all_of_it_at_the_stated_widt
 def test_lengths_of_a_built_in_can_be_chosen():
     near, far = (grimaldi.load(builtin.build("young", separation=s)).sources for s in (0.25, 1.0))
     for sources, separation in ((near, 0.25), (far, 1.0)):
-        a, b = (source.position for source in sources)
+        a, b = (np.asarray(source.position) for source in sources)
         assert np.linalg.norm(a - b) == pytest.approx(separation)
 
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-import mitsuba as mi
+from typing import Any
+
+import mitsuba
 import numpy as np
 import pytest
 
@@ -11,6 +13,7 @@ from grimaldi.engine.tiles import Shot, render_tile
 from grimaldi.errors import InputError
 from grimaldi.light import Settings, prepare
 
+mi: Any = mitsuba  # the stubs refuse numbers where arrays are asked for
 mi.set_variant("llvm_ad_rgb")
 T = mi.ScalarTransform4f
 
