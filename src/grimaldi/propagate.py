@@ -44,13 +44,23 @@ def propagate(
 
 
 def _sags(scene: Scene, source: Source, path: float, where: Reals) -> list[float]:
-    """How coarse each curve's polygon may be for Δ to err by `path`: |∇Δ| <= ρ/z1 + ρ/z2 across the ray."""
+    """How coarse each curve's polygon may be for Δ to err by `path` at points `where`.
+
+    Across the ray |∇Δ| <= d (1/z1 + 1/z2), d the distance of the outline from it, and never more than 2.
+    """
     sags = []
     for shape in scene.screen or [body.geometry for body in scene.bodies]:
         centre, radius = curve(shape)
-        distances = [np.linalg.norm(where - centre, axis=1).min(initial=np.inf)]
-        if source.position is not None:
-            distances.append(np.linalg.norm(source.position - centre))
-        slope = sum(radius / max(0.5 * d, 0.5 * radius) for d in distances)
-        sags.append(float(min(path / slope, 0.01 * radius)))
+        if source.position is None:
+            assert source.direction is not None
+            z1, a = np.inf, np.broadcast_to(source.direction, where.shape)
+        else:
+            z1 = max(float(np.linalg.norm(centre - source.position)) - radius, 0.5 * radius)
+            a = where - source.position
+            a = a / np.maximum(np.linalg.norm(a, axis=1, keepdims=True), 1e-300)
+        v = where - centre
+        d = np.linalg.norm(v - np.einsum("ij,ij->i", v, a)[:, None] * a, axis=1) + radius
+        z2 = np.maximum(np.linalg.norm(v, axis=1) - radius, 0.5 * radius)
+        slope = float((d * (1 / z1 + 1 / z2)).max(initial=1e-3))
+        sags.append(min(path / min(slope, 2.0), 0.01 * radius))
     return sags

@@ -74,7 +74,6 @@ def _planar(scene: Scene, source: Source, tab: Table, k: float, rule: Rule) -> E
 
 def _bodies(scene: Scene, source: Source, tab: Table, sag: float, k: float, rule: Rule, options: Options) -> Evaluate:
     probe = rays(scene, source, sag)
-    rim = 4 * probe.epsilon
 
     def evaluate(receivers: Receivers) -> Factor:
         fr = frame(source, receivers.p, tab.centre, tab.types)
@@ -87,6 +86,6 @@ def _bodies(scene: Scene, source: Source, tab: Table, sag: float, k: float, rule
             probe if options.occlusion else None,
             receivers,
         )
-        return _factor(tab, rule, lit_share(fr, tab, nearest, probe, rim, receivers), 1, sums)
+        return _factor(tab, rule, lit_share(fr, tab, nearest, probe, receivers), 1, sums)
 
     return evaluate

@@ -45,16 +45,17 @@ def _basis(a: Any) -> tuple[Any, Any]:
 
 
 def _turn(frame: Frame, seg: Segment, across: Any, kappa: Any) -> tuple[Any, Any]:
-    """Whether a segment crosses the half-plane from the ray on which `across`·q = 0, as ±1 or 0, and how far out.
+    """Whether a segment crosses the half-plane that `across` is a quarter turn ahead of, as ±1 or 0, and how far out.
 
-    `across` is unit, a quarter turn ahead of the half-plane. Summed over a closed loop this is (1/2π)∮dφ;
-    the side of the ray comes from κ, as in the boundary wave itself.
+    Summed over a closed loop this is (1/2π)∮dφ. The side of the ray comes from κ's sign bit, as in the boundary
+    wave itself: on the edge, where κ is 0, both must take the same side.
     """
     c0 = dr.dot(seg.X0 - frame.foot, across)
     c1 = dr.dot(seg.X1 - frame.foot, across)
-    out = kappa * seg.length / (c1 - c0)
-    straddles = (c0 > 0) != (c1 > 0)
-    return dr.select(straddles, dr.select(c1 > c0, type(out)(1), type(out)(-1)), 0), out
+    one = type(c0)(1)
+    ahead = dr.mulsign(one, c1 - c0)
+    crosses = ((c0 > 0) != (c1 > 0)) & (ahead == dr.mulsign(one, kappa))
+    return dr.select(crosses, ahead, 0), dr.abs(kappa) * seg.length / dr.abs(c1 - c0)
 
 
 # ---------------------------------------------------------------- planar holes and masks
@@ -70,8 +71,7 @@ def planar_sum(fr: Frame, tab: Table, k: float, rule: Rule, active: Any) -> tupl
     while active & (j < tab.size):
         seg = tab.segment(j)
         re, im, er, ei, kappa = segment_wave(fr, seg.X0, seg.e, seg.length, k, rule, active)
-        turn, out = _turn(fr, seg, across, kappa)
-        n += dr.select(out > 0, turn, 0)
+        n += _turn(fr, seg, across, kappa)[0]
         real, imag, err_real, err_imag = real + re, imag + im, err_real + er, err_imag + ei
         j += 1
     return Sum(real, imag, err_real, err_imag), n
@@ -85,8 +85,7 @@ def planar_count(fr: Frame, tab: Table, active: Any) -> Any:
     _, across = _basis(fr.a)
     while active & (j < tab.size):
         seg = tab.segment(j)
-        turn, out = _turn(fr, seg, across, line(fr, seg.X0, seg.e).kappa)
-        n += dr.select(out > 0, turn, 0)
+        n += _turn(fr, seg, across, line(fr, seg.X0, seg.e).kappa)[0]
         j += 1
     return n
 
@@ -140,8 +139,9 @@ def body_sum(
     F = tab.types.Float
     U = dr.uint32_array_t(F)
     n = tab.types.Vector(receivers.n)
-    lift = 0.0 if probe is None else probe.epsilon
-    p = mi.Point3f(receivers.p) + lift * receivers.n  # off its own surface
+    p = mi.Point3f(receivers.p)
+    if dr.hint(probe is not None, mode="scalar"):
+        p = p + probe.epsilon(p) * receivers.n  # off its own surface
     real, imag, err_real, err_imag = F(0), F(0), F(0), F(0)
     nearest2, nearest_segment, nearest_piece = F(dr.inf), U(0), U(0)
     i = U(0)
@@ -193,22 +193,25 @@ def _crossings(fr: Frame, tab: Table, bend: Any, n: Any, active: Any) -> Any:
             top = (fr.z2 - z) / (fr.z2 - along)
             if not fr.plane:
                 top = dr.minimum(top, (fr.z1 + z) / (fr.z1 + along))
-            count += dr.select((out > 0) & (out < height * dr.minimum(top, 1)), turn, 0)
+            count += dr.select(out < height * dr.minimum(top, 1), turn, 0)
             j += 1
         i += 1
     return count
 
 
 @dr.syntax
-def lit_share(fr: Frame, tab: Table, nearest: Nearest, probe: Rays, rim: float, receivers: Receivers) -> Any:
+def lit_share(fr: Frame, tab: Table, nearest: Nearest, probe: Rays, receivers: Receivers) -> Any:
     """1 - n: 1 where the ray S→P is free, 0 where it meets a lit surface.
 
-    A traced ray settles it, but not within `rim` of an outline, where Float32 rays and the outline disagree now
-    and then: there a ray is traced that bends round the open side, and the outlines between the two are counted.
+    A traced ray settles it, but not at the rim, where Float32 rays and the outline disagree now and then: there
+    a ray is traced that bends round the open side, and the outlines between the two are counted.
     """
     F = tab.types.Float
     V = tab.types.Vector
-    p = mi.Point3f(receivers.p) + probe.epsilon * receivers.n
+    p = mi.Point3f(receivers.p)
+    epsilon = probe.epsilon(p)
+    p = p + epsilon * receivers.n
+    rim = F(4 * epsilon + 2 * probe.sag)
     lit = dr.select(probe.lit(p, receivers.active), F(1), F(0))
     near = receivers.active & (nearest.distance2 < rim * rim)
     if near:

@@ -22,12 +22,18 @@ class Rays(NamedTuple):
 
     blockers: Any
     source: Source
-    epsilon: float  # what Float32 coordinates of the scene cannot tell apart, with room [scene units]
+    extent: float  # the largest coordinate of bodies and source
+    sag: float  # how far the outline may lie from its body
+
+    def epsilon(self, p: Any) -> Any:
+        """What Float32 coordinates on a ray from p cannot tell apart, with room [scene units]."""
+        return 4e-6 * dr.maximum(dr.max(dr.abs(p)), self.extent)
 
     def clear(self, origin: Any, target: Any, active: Any) -> Any:
         """Whether nothing stands on origin→target."""
         d = target - origin
-        return ~self.blockers.ray_test(mi.Ray3f(origin, d, 1 - self.epsilon / dr.norm(d), 0, mi.Color0f()), active)
+        end = 1 - self.epsilon(origin) / dr.norm(d)
+        return ~self.blockers.ray_test(mi.Ray3f(origin, d, end, 0, mi.Color0f()), active)
 
     def toward(self, p: Any) -> Any:
         """The unit direction from points to the source."""
@@ -53,17 +59,20 @@ class Rays(NamedTuple):
         d = x - p
         length = dr.norm(d)
         d = d / length
-        end = length - 4 * self.epsilon
+        epsilon = self.epsilon(p)
+        depth = dr.minimum(dr.dot(piece.lit, d), dr.dot(piece.dark, d))  # sine of the angle below the faces at x
+        # the body's own surface at x: what lies across the ray counts the more along it the more it grazes
+        across = 2 * self.sag + 0.25 * epsilon
+        end = length - dr.minimum(4 * epsilon + across / dr.maximum(dr.abs(depth), GRAZING), 0.5 * length)
         hit = self.blockers.ray_intersect_preliminary(
             mi.Ray3f(p, d, end, 0, mi.Color0f()), coherent=True, active=active
         )
         blocked = hit.is_valid()
-        depth = dr.minimum(dr.dot(piece.lit, d), dr.dot(piece.dark, d))  # sine of the angle below the faces at x
         left = end - hit.t
         inside = (piece.closed > 0.5) & (depth > 0) & (left < piece.behind)
         blocked &= (piece.closed < 0.5) | (dr.abs(depth) > GRAZING) | (left > 8 * piece.reach)
         if active & blocked & inside:
-            start = hit.t + self.epsilon
+            start = hit.t + epsilon
             blocked = self.blockers.ray_test(
                 mi.Ray3f(p + start * d, d, end - start, 0, mi.Color0f()), True, active & (end > start)
             )
@@ -87,4 +96,4 @@ def extent(scene: Scene, source: Source) -> float:
 
 def rays(scene: Scene, source: Source, sag: float = 0.0) -> Rays:
     """Visibility rays for one source of a scene that has bodies, towards outlines that lie within `sag` of them."""
-    return Rays(scene.blockers, source, 4e-6 * extent(scene, source) + 2 * sag)
+    return Rays(scene.blockers, source, extent(scene, source), sag)

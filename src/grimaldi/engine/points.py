@@ -52,7 +52,7 @@ def surface_normals(scene: Scene, source: Source) -> Callable[[Any], Any]:
         """What a short ray from the source's side runs into."""
         x = mi.Point3f(p)
         w = probe.toward(x)
-        reach = 4 * probe.epsilon
+        reach = 4 * probe.epsilon(x)
         hit = scene.blockers.ray_intersect(mi.Ray3f(x + reach * w, -w, 2 * reach, 0, mi.Color0f()))
         n = dr.mulsign(mi.Vector3f(hit.n), dr.dot(hit.n, w))
         return dr.select(hit.is_valid(), n, 0)
