@@ -141,6 +141,7 @@ def body_sum(
     n = tab.types.Vector(receivers.n)
     p = mi.Point3f(receivers.p)
     if dr.hint(probe is not None, mode="scalar"):
+        assert probe is not None
         p = p + probe.epsilon(p) * receivers.n  # off its own surface
     real, imag, err_real, err_imag = F(0), F(0), F(0), F(0)
     nearest2, nearest_segment, nearest_piece = F(dr.inf), U(0), U(0)
