@@ -16,9 +16,9 @@ points = np.stack([np.zeros_like(y), y, np.full_like(y, distance)], axis=1)
 
 field = grimaldi.field(scene, points, wavelength=wavelength)
 
-I = field.intensity.values
-bright = y[1:-1][(I[1:-1] > I[:-2]) & (I[1:-1] > I[2:])]
+intensity = field.intensity.values
+bright = y[1:-1][(intensity[1:-1] > intensity[:-2]) & (intensity[1:-1] > intensity[2:])]
 print(f"bright fringes       {len(bright)}")
 print(f"their spacing        {np.diff(bright).mean():.2f}")
 print(f"λL/s                 {wavelength * distance / separation:.2f}")
-print(f"darkest / brightest  {I.min() / I.max():.1e}")
+print(f"darkest / brightest  {intensity.min() / intensity.max():.1e}")

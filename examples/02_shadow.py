@@ -5,7 +5,8 @@ import mitsuba as mi
 import grimaldi
 from grimaldi import film
 
-T = mi.scalar_rgb.ScalarTransform4f
+mi.set_variant("llvm_ad_rgb")
+T = mi.ScalarTransform4f
 white = {"type": "diffuse", "reflectance": {"type": "rgb", "value": 0.8}}
 
 scene = {
