@@ -270,7 +270,7 @@ def test_a_lamp_in_the_middle_of_a_room():
     computed = factor(light, wall, room, ball, tolerance=1e-4)
     np.testing.assert_allclose(computed, expected, rtol=0, atol=1e-3)
     assert abs(computed[30]) == pytest.approx(1, abs=0.1)
-    assert abs(computed[25:28]).max() < 0.6
+    assert abs(computed[[23, 37]]).max() < 0.6  # the dark ring about the spot
     # On the opposite wall, its corners and edges: nothing.
     opposite = np.array([[-64, y, z] for y in (-64, -60, 0, 31) for z in (-64, 5, 63.5)], float)
     computed = factor(light, opposite, room, ball, tolerance=1e-4)

@@ -148,7 +148,7 @@ def test_a_tile_equals_the_same_pixels_of_the_whole_bit_for_bit():
     whole = grimaldi.render(dictionary, spp=8, seed=7)
     scene = grimaldi.load(dictionary)
     sensor = scene.mitsuba.sensors()[0]
-    light = prepare(scene, Settings(wavelength=0.02), sensor)
+    light = prepare(scene, Settings(wavelength=0.02))
     tile = render_tile(light, sensor, Shot(48, 40, 8, 7, 2, 5, False), 48 * 13 + 5, 96)
     pixels = slice(48 * 13 + 5, 48 * 13 + 5 + 96)
     np.testing.assert_array_equal(tile.picture.T, whole.picture.values.reshape(-1, 3)[pixels])

@@ -22,7 +22,7 @@ from grimaldi.errors import InputError
 from grimaldi.options import checked_options
 from grimaldi.propagate import Wave, propagate
 from grimaldi.scene.bodies import vertices
-from grimaldi.scene.model import Scene, Source
+from grimaldi.scene.model import Mesh, Scene, Source
 
 
 @dataclass(frozen=True)
@@ -99,8 +99,8 @@ class Reflected(NamedTuple):
     error: list[Any]
 
 
-def prepare(scene: Scene, settings: Settings, sensor: Any) -> Light:
-    """Find each source's outlines for what `sensor` sees; the result is pure data and functions of points.
+def prepare(scene: Scene, settings: Settings) -> Light:
+    """Find each source's outlines for what the scene's cameras see; the result is pure data and functions of points.
 
     Raises InputError where the wavelength is missing or wrong.
     """
@@ -109,7 +109,7 @@ def prepare(scene: Scene, settings: Settings, sensor: Any) -> Light:
     wavelengths = parse_wavelengths(settings.wavelength, settings.scene_unit or scene.unit)
     options = checked_options(settings.tolerance, settings.precision, settings.occlusion)
     factor = model(settings.diffraction)
-    where = seen(scene, sensor).points
+    where = np.concatenate([seen(scene, sensor).points for sensor in scene.mitsuba.sensors()])
     sources = scene.sources if settings.interference else separated(scene.sources)
     keys = tuple((wavelength, group) for wavelength in wavelengths for group in groups(sources))
     beams = tuple(
@@ -145,7 +145,7 @@ class LightOf:
         if self._light is None or key != self._key:
             for warning in said:
                 warnings.warn(warning.message, stacklevel=2)
-            self._key, self._light = key, prepare(loaded, self.settings, loaded.mitsuba.sensors()[0])
+            self._key, self._light = key, prepare(loaded, self.settings)
         return self._light
 
 
@@ -165,14 +165,18 @@ def _tint(source: Source) -> Any:
 
 
 def fingerprint(scene: Scene) -> bytes:
-    """Changes when a body or a source does."""
+    """Changes when a body, a source or a camera does."""
     digest = blake2b(digest_size=16)
     for body in scene.bodies:
         digest.update(np.ascontiguousarray(vertices(body.geometry)).tobytes())
+        if isinstance(body.geometry, Mesh):
+            digest.update(np.ascontiguousarray(body.geometry.faces).tobytes())
     for planar in scene.screen:
         digest.update(np.concatenate([*planar.loops, planar.to_world[:, :2]], axis=None).tobytes())
     for s in scene.sources:
         digest.update(repr((s.name, s.group, s.amplitude, s.phase, s.tint)).encode())
         for v in (s.position, s.direction, s.origin):
             digest.update(b"-" if v is None else v.tobytes())
+    for sensor in scene.mitsuba.sensors():
+        digest.update(repr((sensor.world_transform(), sensor.film().crop_size())).encode())
     return digest.digest()

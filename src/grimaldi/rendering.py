@@ -90,12 +90,12 @@ def render(
     settings = replace(_settings(own), **{name: value for name, value in asked.items() if value is not None})
     settings.check()
     if settings.coherent:
-        loaded = load(loaded.mitsuba, scene_unit=loaded.unit, coherent=settings.coherent)
+        loaded = load(loaded, coherent=settings.coherent)
     sensor = loaded.mitsuba.sensors()[0]
     with _resized(sensor, size):
         settings = _with_wavelength(settings, loaded, sensor)
         shot = _shot(sensor, own, spp, seed, max_depth)
-        light = prepare(loaded, settings, sensor)
+        light = prepare(loaded, settings)
         warn_of_fine_fringes(loaded, sensor, [wavelength for wavelength, _ in light.keys])
         done: list[Tile] = []
         with progress(shot.width * shot.height, "render") as advance:

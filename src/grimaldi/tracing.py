@@ -9,8 +9,7 @@ import drjit as dr
 import mitsuba as mi
 
 from grimaldi.light import Reflected
-
-DIFFRACTING = ("PointLight", "DirectionalEmitter")
+from grimaldi.scene.sources import diffracts
 
 
 class Path(NamedTuple):
@@ -72,7 +71,7 @@ def trace(
         emits = active & (emitter != None)  # noqa: E711 (an array of pointers)
         if dr.hint(hide_emitters, mode="scalar"):
             emits &= depth > 0
-        mis = dr.select(delta_prev, 1, _balance(pdf_prev, pdf_light))
+        mis = dr.select(delta_prev, 1, _power_heuristic(pdf_prev, pdf_light))
         L[emits] += beta * mis * emitter.eval(si, emits)
 
         valid |= active & si.is_valid() | (emits & (depth == 0))
@@ -124,19 +123,15 @@ def _where(mask: Any, new: list[Any], old: list[Any]) -> list[Any]:
     return [dr.select(mask, a, b) for a, b in zip(new, old, strict=True)]
 
 
-def _balance(a: Any, b: Any) -> Any:
-    """Mitsuba's power heuristic."""
+def _power_heuristic(a: Any, b: Any) -> Any:
+    """Weight of a sample by the density a when b could have made it too (Veach 1997, §9.2.4)."""
     a2 = a * a
     return dr.select(a > 0, a2 / dr.fma(b, b, a2), 0)
 
 
 def ordinary_emitters(scene: Any) -> list[int]:
     """Where the emitters that are not sources of waves stand in the scene's list."""
-    return [
-        i
-        for i, emitter in enumerate(scene.emitters())
-        if not hasattr(emitter, "plugin_name") and emitter.class_name() not in DIFFRACTING
-    ]
+    return [i for i, emitter in enumerate(scene.emitters()) if not diffracts(emitter)]
 
 
 def ordinary_light(scene: Any, sampler: Any, ordinary: list[int], si: Any, bsdf: Any, active: Any) -> Any:
@@ -153,5 +148,5 @@ def ordinary_light(scene: Any, sampler: Any, ordinary: list[int], si: Any, bsdf:
     active &= ~scene.ray_test(si.spawn_ray_to(ds.p), active)
     wo = si.to_local(ds.d)
     f, pdf = bsdf.eval_pdf(mi.BSDFContext(), si, wo, active)
-    mis = dr.select(ds.delta, 1, _balance(ds.pdf, pdf))
+    mis = dr.select(ds.delta, 1, _power_heuristic(ds.pdf, pdf))
     return dr.select(active, f * weight * (mis * len(ordinary)), 0)

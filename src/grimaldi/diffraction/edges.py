@@ -11,10 +11,10 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from grimaldi.diffraction.frame import constant
+from grimaldi.diffraction.frame import Frame, constant
 from grimaldi.diffraction.model import Receivers
 from grimaldi.diffraction.occlusion import Rays
-from grimaldi.diffraction.segment import Frame, Line, Rule, detour, line, segment_wave, stationary
+from grimaldi.diffraction.segment import Line, Rule, detour, line, segment_wave, stationary
 from grimaldi.diffraction.table import Piece, Segment, Table
 
 

@@ -2,14 +2,23 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import drjit as dr
 import numpy as np
 
 from grimaldi.diffraction.arrays import Types, types
-from grimaldi.diffraction.segment import Frame
 from grimaldi.scene.model import Source, Vector
+
+
+class Frame(NamedTuple):
+    """The ray S→P as Dr.Jit arrays, seen from its foot near the outlines."""
+
+    a: Any  # unit direction
+    foot: Any  # foot of the outlines' centre on the ray, relative to the centre
+    z1: Any  # along the ray from S to the foot; unused for a plane wave
+    z2: Any  # from the foot to P
+    plane: bool
 
 
 def constant(Vector3: Any, v: Vector) -> Any:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import drjit as dr
@@ -63,7 +64,8 @@ class Rays(NamedTuple):
         depth = dr.minimum(dr.dot(piece.lit, d), dr.dot(piece.dark, d))  # sine of the angle below the faces at x
         # the body's own surface at x: what lies across the ray counts the more along it the more it grazes
         across = 2 * self.sag + 0.25 * epsilon
-        end = length - dr.minimum(4 * epsilon + across / dr.maximum(dr.abs(depth), GRAZING), 0.5 * length)
+        margin = dr.minimum(4 * epsilon + across / dr.maximum(dr.abs(depth), GRAZING), 0.5 * length)
+        end = length - margin
         hit = self.blockers.ray_intersect_preliminary(
             mi.Ray3f(p, d, end, 0, mi.Color0f()), coherent=True, active=active
         )
@@ -72,9 +74,10 @@ class Rays(NamedTuple):
         inside = (piece.closed > 0.5) & (depth > 0) & (left < piece.behind)
         blocked &= (piece.closed < 0.5) | (dr.abs(depth) > GRAZING) | (left > 8 * piece.reach)
         if active & blocked & inside:
-            start = hit.t + epsilon
-            blocked = self.blockers.ray_test(
-                mi.Ray3f(p + start * d, d, end - start, 0, mi.Color0f()), True, active & (end > start)
+            start = hit.t + margin
+            more = end > start  # a ray of negative length would count as blocked
+            blocked = more & self.blockers.ray_test(
+                mi.Ray3f(p + start * d, d, dr.maximum(end - start, 0), 0, mi.Color0f()), True, active & more
             )
         return ~blocked
 
@@ -97,3 +100,21 @@ def extent(scene: Scene, source: Source) -> float:
 def rays(scene: Scene, source: Source, sag: float = 0.0) -> Rays:
     """Visibility rays for one source of a scene that has bodies, towards outlines that lie within `sag` of them."""
     return Rays(scene.blockers, source, extent(scene, source), sag)
+
+
+def surface_normals(scene: Scene, source: Source) -> Callable[[Any], Any]:
+    """A function of points: the unit normal, towards the source, of the body surface they lie on; 0 elsewhere."""
+    if scene.blockers is None:
+        return lambda p: dr.zeros(mi.Vector3f, dr.width(p))
+    probe = rays(scene, source)
+
+    def normals(p: Any) -> Any:
+        """What a short ray from the source's side runs into."""
+        x = mi.Point3f(p)
+        w = probe.toward(x)
+        reach = 4 * probe.epsilon(x)
+        hit = scene.blockers.ray_intersect(mi.Ray3f(x + reach * w, -w, 2 * reach, 0, mi.Color0f()))
+        n = dr.mulsign(mi.Vector3f(hit.n), dr.dot(hit.n, w))
+        return dr.select(hit.is_valid(), n, 0)
+
+    return normals

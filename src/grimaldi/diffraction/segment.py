@@ -18,6 +18,8 @@ from typing import Any, NamedTuple
 import drjit as dr
 import numpy as np
 
+from grimaldi.diffraction.frame import Frame
+
 
 class Rule(NamedTuple):
     """How finely a segment is integrated for a tolerance: eq. numbers in the module's docstring.
@@ -44,16 +46,6 @@ class Rule(NamedTuple):
             n, phase, stretch = 16, 8.0, 1.6
         x, w = np.polynomial.legendre.leggauss(n)
         return Rule(K, phase, stretch, tuple((0.5 * (x + 1)).tolist()), tuple((0.5 * w).tolist()), share)
-
-
-class Frame(NamedTuple):
-    """The ray S→P as Dr.Jit arrays, seen from its foot near the outlines (computed in Float64, THEORY 2)."""
-
-    a: Any  # unit direction
-    foot: Any  # foot of the outlines' centre on the ray, relative to the centre
-    z1: Any  # along the ray from S to the foot; unused for a plane wave
-    z2: Any  # from the foot to P
-    plane: bool
 
 
 class Line(NamedTuple):

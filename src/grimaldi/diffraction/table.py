@@ -23,7 +23,7 @@ class Segment(NamedTuple):
 
 
 class Piece(NamedTuple):
-    """A few neighbouring segments; its middle vertex stands for all in the tests of what blocks X→P."""
+    """A few neighbouring segments; the middle of its middle segment stands for all in the tests of what blocks X→P."""
 
     first: Any
     end: Any
@@ -100,8 +100,7 @@ def table(outline: Outline, types: Types) -> Table:
     zero = np.zeros_like(length)
     segments = np.concatenate([X0, length, X1, zero, (X1 - X0) / length, zero], 1)
     middle = (ranges[:-1] + ranges[1:]) // 2
-    several = (ranges[1:] - ranges[:-1] > 1)[:, None]
-    target = np.where(several, X0[middle], 0.5 * (X0[middle] + X1[middle]))
+    target = 0.5 * (X0[middle] + X1[middle])
     reach = 0.5 * np.add.reduceat(length[:, 0], ranges[:-1])[:, None]
     normals = outline.normals[middle]
     closed = (np.linalg.norm(normals[:, 1], axis=1) > 0).astype(float)[:, None]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +24,7 @@ def at_points(
 
     from grimaldi.diffraction.arrays import types
     from grimaldi.diffraction.model import Receivers
+    from grimaldi.diffraction.occlusion import surface_normals
 
     double = types(double=True)
     normals = surface_normals(scene, source)
@@ -34,27 +35,3 @@ def at_points(
         u = wave(Receivers(p, n, dr.mask_t(p.x)(True)))
         dr.eval(u)
         yield block, u.real.numpy() + 1j * u.imag.numpy(), u.error.numpy()
-
-
-def surface_normals(scene: Scene, source: Source) -> Callable[[Any], Any]:
-    """A function of points: the unit normal, towards the source, of the body surface they lie on; 0 elsewhere."""
-    import drjit as dr
-    import mitsuba
-
-    from grimaldi.diffraction.occlusion import rays
-
-    mi: Any = mitsuba  # the stubs refuse numbers where arrays are asked for
-    if scene.blockers is None:
-        return lambda p: dr.zeros(mi.Vector3f, dr.width(p))
-    probe = rays(scene, source)
-
-    def normals(p: Any) -> Any:
-        """What a short ray from the source's side runs into."""
-        x = mi.Point3f(p)
-        w = probe.toward(x)
-        reach = 4 * probe.epsilon(x)
-        hit = scene.blockers.ray_intersect(mi.Ray3f(x + reach * w, -w, 2 * reach, 0, mi.Color0f()))
-        n = dr.mulsign(mi.Vector3f(hit.n), dr.dot(hit.n, w))
-        return dr.select(hit.is_valid(), n, 0)
-
-    return normals

@@ -92,8 +92,8 @@ def _assemble(edges: Candidates, body: Integers, lit: Stretches, behind: Reals, 
     span = edges.end[c] - edges.start[c]
     start = np.where((lit.low > 0)[:, None], edges.start[c] + lit.low[:, None] * span, edges.start[c])
     end = np.where((lit.high < 1)[:, None], edges.start[c] + lit.high[:, None] * span, edges.end[c])
-    size = np.abs(start).max(initial=0.0)
-    some = np.linalg.norm(end - start, axis=1) > 1e-13 * size  # two cuts can fall on one Float64 place
+    reach = np.abs(start).max(initial=0.0)
+    some = np.linalg.norm(end - start, axis=1) > 1e-13 * reach  # two cuts can fall on one Float64 place
     start, end, c, behind = start[some], end[some], c[some], behind[some]
     order, chain = _chains(start, end)
     start, end, c = start[order], end[order], c[order]

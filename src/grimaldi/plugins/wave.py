@@ -44,6 +44,10 @@ def register(V: Any) -> None:
            - |string|
            - "auto" or "double". (Default: "auto")
 
+         * - occlusion
+           - |bool|
+           - Whether bodies block the way from an outline to a surface. (Default: true)
+
          * - max_depth
            - |int|
            - Longest path from the camera; 2 is direct light, -1 no limit. (Default: 2)
@@ -51,6 +55,10 @@ def register(V: Any) -> None:
          * - rr_depth
            - |int|
            - Path length from which Russian roulette may end a path. (Default: 5)
+
+         * - hide_emitters
+           - |bool|
+           - Whether the camera does not see emitters directly. (Default: false)
 
          * - coherent
            - |string|
@@ -86,6 +94,7 @@ def register(V: Any) -> None:
                 interference=bool(props.get("interference", True)),
                 tolerance=parameters.number(props, "tolerance", 1e-3),
                 precision=str(props.get("precision", "auto")),
+                occlusion=bool(props.get("occlusion", True)),
                 coherent=parameters.names(props, "coherent"),
             )
             settings.check()

@@ -49,9 +49,9 @@ def load(
     """
     added = _outlines(outlines)
     if isinstance(scene, Scene):
+        loaded = replace(scene, sources=sources(scene.mitsuba, coherent=coherent)) if coherent else scene
         if not added and scene_unit is None:
-            return scene
-        loaded = scene
+            return loaded
     else:
         loaded = _read(scene, coherent)
     loaded = replace(
@@ -95,8 +95,14 @@ def _read(scene: Any, coherent: Collection[str]) -> Scene:
         bodies=shapes.bodies,
         sources=found,
         holes=shapes.holes,
-        unit=unit,
+        unit=unit or _unit_of_wave(mi_scene.integrator()),
     )
+
+
+def _unit_of_wave(integrator: Any) -> str | None:
+    """The `scene_unit` of a scene's own `wave` integrator."""
+    light_of = getattr(integrator, "light_of", None)
+    return None if light_of is None else light_of.settings.scene_unit
 
 
 def _open(scene: Any) -> tuple[str, Any, str | None]:

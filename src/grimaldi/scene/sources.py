@@ -40,7 +40,7 @@ def sources(mi_scene: Any, *, coherent: Collection[str] = ()) -> tuple[Source, .
     ordinary: list[str] = []
     names = _unique_names(mi_scene.emitters())
     for emitter, name in zip(mi_scene.emitters(), names, strict=True):
-        if _kind(emitter) in _DIFFRACTING:
+        if diffracts(emitter):
             _check_variant()
             found.append(_source(emitter, name, coherent))
         else:
@@ -53,6 +53,11 @@ def sources(mi_scene: Any, *, coherent: Collection[str] = ()) -> tuple[Source, .
             stacklevel=2,
         )
     return tuple(found)
+
+
+def diffracts(emitter: Any) -> bool:
+    """Whether a Mitsuba emitter is a source of waves; the others stay ordinary light."""
+    return _kind(emitter) in _DIFFRACTING
 
 
 def _kind(emitter: Any) -> str:
