@@ -51,23 +51,30 @@ def sort_shapes(shapes: Iterable[Any]) -> Shapes:
     return Shapes(tuple(bodies), tuple(holes), tuple(others))
 
 
-def blockers(mi_scene: Any, bodies: Iterable[Body]) -> Any:
-    """A Mitsuba scene that shares the bodies' shapes and holds nothing else; None without bodies.
+def blockers(mi_scene: Any) -> Any:
+    """A Mitsuba scene that shares all shapes that stop light, also those that do not diffract; None without any.
 
-    Embree's robust mode finds rays that meet an edge exactly, as those along an outline do.
+    Only what has a null BSDF or part (apertures, masks, media) is left out. Embree's robust mode finds rays that
+    meet an edge exactly, as those along an outline do.
     """
     import mitsuba as mi
 
-    shapes = mi_scene.shapes()
-    opaque = [shapes[body.shape] for body in bodies]
+    opaque = [shape for shape in mi_scene.shapes() if not _lets_through(shape)]
     if not opaque:
         return None
     names = [shape.id() for shape in opaque]
-    parts = {f"body-{i}": shape for i, shape in enumerate(opaque)}
+    parts = {f"shape-{i}": shape for i, shape in enumerate(opaque)}
     scene = mi.load_dict({"type": "scene", "embree_use_robust_intersections": True, **parts})
     for shape, name in zip(opaque, names, strict=True):  # loading renames them by their keys
         shape.set_id(name)
     return scene
+
+
+def _lets_through(shape: Any) -> bool:
+    import mitsuba as mi
+
+    bsdf = shape.bsdf()
+    return bsdf is not None and bool(bsdf.flags() & int(mi.BSDFFlags.Null))
 
 
 def faces_inward(mi_scene: Any, body: Body) -> bool:

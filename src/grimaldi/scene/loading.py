@@ -91,7 +91,7 @@ def _read(scene: Any, coherent: Collection[str]) -> Scene:
     return Scene(
         name=name,
         mitsuba=mi_scene,
-        blockers=blockers(mi_scene, shapes.bodies),
+        blockers=blockers(mi_scene),
         bodies=shapes.bodies,
         sources=found,
         holes=shapes.holes,

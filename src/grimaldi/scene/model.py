@@ -74,9 +74,9 @@ class Body:
 class Scene:
     """A checked scene.
 
-    `mitsuba` is the whole scene as the camera sees it; `blockers` holds only the opaque bodies
+    `mitsuba` is the whole scene as the camera sees it; `blockers` holds only what stops light
     (apertures, null and mask surfaces left out) and is what visibility rays are traced in, None where
-    there is no body. `holes` are the openings of one infinite opaque screen, `masks` opaque planar
+    there is nothing. `holes` are the openings of one infinite opaque screen, `masks` opaque planar
     outlines without a shape of their own.
     """
 
