@@ -6,8 +6,9 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
+import grimaldi
 from grimaldi import PlanarOutline
-from grimaldi.errors import InputError
+from grimaldi.errors import InputError, NotYet
 
 SQUARE = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
 
@@ -127,3 +128,17 @@ def test_wrong_files_are_named(tmp_path: Path, name, content, says):
 def test_wrong_to_world_is_named(to_world):
     with pytest.raises(InputError, match=r"to_world is (singular|no affine map)"):
         PlanarOutline(SQUARE, to_world)
+
+
+def test_a_mask_among_bodies_is_refused_not_ignored():
+    """Its shadow would be computed, but not the ball's."""
+    square = np.array([[-5, -5], [5, -5], [5, 5], [-5, 5]], float)
+    place = np.eye(4)
+    place[2, 3] = 50
+    scene = {
+        "type": "scene",
+        "light": {"type": "coherent_directional", "direction": [0, 0, -1]},
+        "ball": {"type": "sphere", "center": [40, 0, 20], "radius": 10},
+    }
+    with pytest.raises(NotYet, match="ball"):
+        grimaldi.load(scene, outlines=[grimaldi.PlanarOutline(square, place, hole=False)])

@@ -99,7 +99,10 @@ def test_outlines_are_added():
     square = [[0, 0], [1, 0], [1, 1], [0, 1]]
     scene = grimaldi.load(shapes(lamp=LAMP))
     assert len(grimaldi.load(scene, outlines=[PlanarOutline(square)]).holes) == 1
-    assert len(grimaldi.load(scene, outlines=[PlanarOutline(square, hole=False)] * 2).masks) == 2
+    masks = [PlanarOutline(np.add(square, [x, 0]), hole=False) for x in (0, 2)]
+    assert len(grimaldi.load(scene, outlines=masks).masks) == 2
+    with pytest.raises(InputError, match="1 and 2 overlap"):
+        grimaldi.load(scene, outlines=masks[:1] * 2)
     assert scene.holes == scene.masks == ()
     with pytest.raises(InputError, match="outlines: list is no PlanarOutline"):
         grimaldi.load(scene, outlines=[square])  # pyright: ignore[reportArgumentType]
@@ -338,11 +341,11 @@ def test_bodies_beside_the_light_and_flat_receivers_are_fine(parts):
 @pytest.mark.parametrize(
     ("parts", "says"),
     [
-        ({"ball": at("sphere", 0, 0, BEHIND)}, "ball: a body behind the aperture screen"),
-        ({"box": at("cube", 9, 0, BEHIND)}, "box: a body behind the aperture screen"),
+        ({"ball": at("sphere", 0, 0, BEHIND)}, "ball: a body beside an aperture screen"),
+        ({"box": at("cube", 9, 0, BEHIND)}, "box: a body beside an aperture screen"),
         (
             {"near": at("rectangle", 0, 0, BEHIND), "far": at("rectangle", 0, 0, 9)},
-            "near: a body behind the aperture screen .* hide 'far'",
+            "near: a body beside an aperture screen .* hide 'far'",
         ),
         ({"ball": at("sphere", 0.8, 0, BEFORE)}, "ball: a body between source and aperture"),
         ({"box": at("cube", 0, 0, BEFORE, scale=0.1)}, "box: a body between source and aperture"),

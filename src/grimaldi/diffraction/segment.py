@@ -38,7 +38,7 @@ class Rule(NamedTuple):
     @staticmethod
     def of(tolerance: float) -> Rule:
         share = 0.1 * tolerance
-        K = max(8.0, (0.5 / share) ** 0.25)  # the series' next term is below about 0.5 K⁻⁴
+        K = max(10.0, 1.5 * (0.5 / share) ** 0.25)  # the series' next term is about 0.5 K⁻⁴; ends add up
         n, phase, stretch = 4, 3.0, 1.5
         if tolerance < 5e-4:
             n, phase, stretch = 8, 4.0, 1.5
@@ -69,9 +69,10 @@ def line(frame: Frame, X0: Any, e: Any) -> Line:
     eq = e - ea * frame.a
     kappa = dr.dot(frame.a, dr.cross(q0, eq))
     eqq = dr.maximum(dr.squared_norm(eq), 1e-20)
-    # w > 0 keeps v finite on the rim itself; far below what any tolerance sees
-    w = dr.maximum(dr.abs(kappa) / eqq, 1e-15 * (dr.abs(h) + frame.z2) + 1e-30)
-    return Line(q0, h, ea, eqq, -dr.dot(q0, eq) / eqq, w, kappa)
+    td = -dr.dot(q0, eq) / eqq
+    # on the rim itself w is 0: keep it above the rounding of t, far below what any tolerance sees
+    w = dr.maximum(dr.abs(kappa) / eqq, 8 * dr.epsilon(kappa) * (dr.abs(td) + dr.norm(q0)) + 1e-30)
+    return Line(q0, h, ea, eqq, td, w, kappa)
 
 
 def detour(frame: Frame, ln: Line, t: Any, d2: Any) -> tuple[Any, Any, Any, Any]:

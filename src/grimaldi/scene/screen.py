@@ -15,33 +15,36 @@ from grimaldi.scene.planar import PlanarOutline
 
 Reals = NDArray[np.float64]
 
-_BEHIND = "a body behind the aperture screen is not handled yet"
+_BESIDE = "a body beside an aperture screen or mask is not handled yet"
 
 
 def check_screen(scene: Scene) -> None:
-    """Checks a scene that has holes: all in one plane, all sources on one side of it, no body in the way.
+    """Checks a scene that has holes or masks: all in one plane, all sources on one side of it, no body in the way.
 
-    Bodies on the far side may be flat ones that hide nothing of each other: they receive the light.
+    Flat bodies that hide nothing of each other may receive the light on either side, and one body of any shape
+    on the sources' own side.
 
     Raises:
-        InputError: holes that overlap.
+        InputError: holes or masks that overlap.
         NotYet: anything else that is not as said above.
     """
-    if not scene.holes:
+    if not scene.screen:
         return
-    if scene.masks:
+    if scene.holes and scene.masks:
         raise NotYet("outlines: an opaque mask beside an aperture is not handled yet; cut it out as an island")
-    points = np.concatenate([loop for hole in scene.holes for loop in hole.world_loops()])
-    origin, normal = scene.holes[0].origin, scene.holes[0].normal
+    kind = "holes" if scene.holes else "masks"
+    points = np.concatenate([loop for outline in scene.screen for loop in outline.world_loops()])
+    origin, normal = scene.screen[0].origin, scene.screen[0].normal
     slack = FLAT * (np.ptp(points, axis=0).max() + np.abs(points).max())
     if np.abs((points - origin) @ normal).max() > slack:
-        raise NotYet("aperture: holes in different planes are not handled yet; put all into one plane")
-    _check_overlap(scene.holes)
+        raise NotYet(f"aperture: {kind} in different planes are not handled yet; put all into one plane")
+    _check_overlap(scene.screen)
 
     if not scene.sources:
         return
     normal = normal * _side(scene.sources, origin, normal, slack)  # now towards the sources
     far: list[Body] = []
+    near: list[Body] = []
     for body in scene.bodies:
         low, high = _heights(body.geometry, origin, normal)
         if high <= slack and low < -slack:
@@ -50,10 +53,14 @@ def check_screen(scene: Scene) -> None:
             raise NotYet(f"{body.name}: a body that meets the aperture screen is not handled yet; move it away")
         elif any(
             _may_hide(body.geometry, hole, source, normal)
-            for hole, source in itertools.product(scene.holes, scene.sources)
+            for hole, source in itertools.product(scene.screen, scene.sources)
         ):
             raise NotYet(f"{body.name}: a body between source and aperture is not handled yet; move it aside")
+        else:
+            near.append(body)
     _check_receivers(far, scene.sources)
+    if len(near) > 1:  # one alone has nothing to shade
+        _check_receivers(near, scene.sources)
 
 
 def _check_overlap(holes: tuple[PlanarOutline, ...]) -> None:
@@ -145,10 +152,10 @@ def _check_receivers(bodies: list[Body], sources: tuple[Source, ...]) -> None:
     points = [vertices(body.geometry) for body in bodies]
     for body, own in zip(bodies, points, strict=True):
         if isinstance(body.geometry, Sphere) or not is_flat(own):
-            raise NotYet(f"{body.name}: {_BEHIND}; only flat ones that receive the light are")
+            raise NotYet(f"{body.name}: {_BESIDE}; only flat ones that receive the light are")
         centre, normal, _ = plane(own)
         for (other, theirs), source in itertools.product(zip(bodies, points, strict=True), sources):
             side = np.sign(_away(source, centre) @ normal)
             slack = FLAT * (np.abs(own).max() + np.abs(theirs).max())
             if ((theirs - centre) @ normal * side).min() < -slack:
-                raise NotYet(f"{body.name}: {_BEHIND} where it may hide {other.name!r}; move it")
+                raise NotYet(f"{body.name}: {_BESIDE} where it may hide {other.name!r}; move it")
