@@ -11,10 +11,11 @@ import numpy as np
 
 from grimaldi.camera import View, seen
 from grimaldi.errors import GrimaldiWarning
-from grimaldi.outlines.extract import outline
 from grimaldi.outlines.model import Reals
+from grimaldi.scene.bodies import vertices
 from grimaldi.scene.model import Scene
 
+SOME = 256  # points of a body suffice to tell how far it is
 WANTED = 4.0  # pixels that a suggested wavelength's fringes take
 
 
@@ -48,18 +49,28 @@ def _scales(scene: Scene, sensor: Any) -> Iterator[tuple[float, float]]:
     if not len(points):
         return
     for source in scene.sources:
-        edges = _above(outline(scene, source).start, view)
-        if not len(edges):
-            continue
-        centre = edges.mean(axis=0)
-        z2 = np.linalg.norm(points - centre, axis=1)
-        z1 = np.inf if source.position is None else float(np.linalg.norm(centre - source.position))
-        yield float(np.median(np.sqrt(z2 * (1 + z2 / z1)) / pixel)), 0.5
+        for x in _obstacles(scene):
+            edges = _above(x, view)
+            if not len(edges):
+                continue
+            centre = edges.mean(axis=0)
+            z2 = np.linalg.norm(points - centre, axis=1)
+            z1 = np.inf if source.position is None else float(np.linalg.norm(centre - source.position))
+            yield float(np.median(np.sqrt(z2 * (1 + z2 / z1)) / pixel)), 0.5
     for a, b in combinations(scene.sources, 2):
         if a.group == b.group:
             angle = np.linalg.norm(_direction(a, points) - _direction(b, points), axis=1)
             if (angle > 0).any():
                 yield float(np.median(1 / (angle[angle > 0] * pixel[angle > 0]))), 1.0
+
+
+def _obstacles(scene: Scene) -> Iterator[Reals]:
+    """Some points (n, 3) of each body, hole or mask that stands in the light."""
+    for body in scene.bodies:
+        x = vertices(body.geometry)
+        yield x[:: len(x) // SOME + 1]
+    for shape in scene.screen:
+        yield np.concatenate(shape.world_loops(SOME))
 
 
 def _above(x: Reals, view: View) -> Reals:
