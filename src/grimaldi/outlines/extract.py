@@ -8,7 +8,7 @@ import numpy as np
 
 from grimaldi.outlines import disk, mesh, planar, sphere
 from grimaldi.outlines.candidate import Candidates, toward
-from grimaldi.outlines.hidden import Queries, behind
+from grimaldi.outlines.hidden import Obstacle, Queries, behind, obstacles
 from grimaldi.outlines.lit import Stretches, lit_parts
 from grimaldi.outlines.model import Integers, Outline, Reals
 from grimaldi.scene.model import Body, Geometry, Mesh, Scene, Source, Sphere
@@ -40,9 +40,10 @@ def outline(scene: Scene, source: Source, *, sag: Sequence[float] | None = None)
     body = np.repeat(np.arange(len(parts)), [len(part.start) for part in parts])
     edges = Candidates.concatenate(parts)
     extents = np.array([np.linalg.norm(np.ptp(part.start, axis=0)) if len(part.start) else 0.0 for part in parts])
-    lit = lit_parts(scene.bodies, source, edges, body, LONGEST * extents[body])
+    standing = obstacles(scene.bodies, source)
+    lit = lit_parts(standing, source, edges, body, LONGEST * extents[body])
     coarsest = max((s for b, s in zip(scene.bodies, sag, strict=True) if not isinstance(b.geometry, Mesh)), default=0.0)
-    return _assemble(edges, body, lit, _behind(scene.bodies, source, edges, body, lit), source, coarsest)
+    return _assemble(edges, body, lit, _behind(standing, source, edges, body, lit), source, coarsest)
 
 
 def curve(shape: Geometry | PlanarOutline) -> tuple[Reals, float]:
@@ -64,12 +65,12 @@ def _silhouette(body: Body, source: Source, sag: float) -> Candidates:
     return disk.silhouette(geometry, source, sag)
 
 
-def _behind(bodies: tuple[Body, ...], source: Source, edges: Candidates, body: Integers, lit: Stretches) -> Reals:
+def _behind(standing: tuple[Obstacle, ...], source: Source, edges: Candidates, body: Integers, lit: Stretches) -> Reals:
     """For each lit stretch, how far behind its middle its own body comes next."""
     c, at = lit.candidate, 0.5 * (lit.low + lit.high)
     x = edges.start[c] + at[:, None] * (edges.end[c] - edges.start[c])
     result = np.full(len(c), np.inf)
-    for number, of in enumerate(bodies):
+    for number, of in enumerate(standing):
         own = body[c] == number
         result[own] = behind(of, source, Queries(x, body[c], edges.faces[c])[own])
     return result

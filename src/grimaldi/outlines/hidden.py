@@ -15,6 +15,7 @@ from grimaldi.scene.model import Body, Disk, Mesh, Source, Sphere
 
 TOUCHING = 1e-9  # of the way to the source (of the scene's size for a plane wave): no nearer blocker counts
 WIDE = 0.05  # view radius above which a triangle is held against every point
+PART = 1024  # points held against triangles at once
 
 
 def view(source: Source, x: Reals) -> Reals:
@@ -26,21 +27,59 @@ def view(source: Source, x: Reals) -> Reals:
     return x - (x @ source.direction)[..., None] * source.direction
 
 
-def overlaps(
-    centres: Reals, radii: Reals, others: Reals, other_radius: float, wide: float
-) -> tuple[Integers, Integers]:
-    """Pairs (i, j) of balls `centres[i]`, `radii[i]` and points `others[j]` within radii[i] + other_radius."""
-    tree = KDTree(others)
-    small = np.flatnonzero(radii <= wide)
-    found = tree.query_ball_point(centres[small], radii[small] + other_radius, return_sorted=False)
-    lengths = np.fromiter((len(f) for f in found), np.int64, len(found))
-    i = np.repeat(small, lengths)
-    j = np.concatenate([np.asarray(f, np.int64) for f in found if f] or [np.empty(0, np.int64)])
-    large = np.flatnonzero(radii > wide)
-    return (
-        np.concatenate([i, np.repeat(large, len(others))]),
-        np.concatenate([j, np.tile(np.arange(len(others)), len(large))]),
-    )
+class Balls:
+    """Balls in a source's view, found by the points they hold: small ones through a tree, wide ones always."""
+
+    def __init__(self, centres: Reals, radii: Reals, wide: float) -> None:
+        self.centres, self.radii = centres, radii
+        self.small, self.large = np.flatnonzero(radii <= wide), np.flatnonzero(radii > wide)
+        self.widest = float(radii[self.small].max(initial=0.0))
+        self.tree = KDTree(centres[self.small])
+
+    def holding(self, points: Reals, margin: float = 0.0) -> tuple[Integers, Integers]:
+        """Pairs (ball, point) of points (n, 3) within `margin` of the balls."""
+        found = self.tree.query_ball_point(points, self.widest + margin, return_sorted=False)
+        lengths = np.fromiter(map(len, found), np.int64, len(found))
+        point = np.repeat(np.arange(len(points)), lengths)
+        parts = [np.asarray(f, np.int64) for f in found if f]
+        ball = self.small[np.concatenate(parts)] if parts else np.empty(0, np.int64)
+        near = np.linalg.norm(points[point] - self.centres[ball], axis=1) <= self.radii[ball] + margin
+        return (
+            np.concatenate([ball[near], np.repeat(self.large, len(points))]),
+            np.concatenate([point[near], np.tile(np.arange(len(points)), len(self.large))]),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Triangles:
+    """A mesh as a source sees it: corners (m, 3, 3) in space, and the balls that hold them in view."""
+
+    corners: Reals
+    balls: Balls
+
+
+Obstacle = Triangles | Sphere | Disk
+
+
+def obstacles(bodies: tuple[Body, ...], source: Source) -> tuple[Obstacle, ...]:
+    """Bodies prepared for `hidden` and `behind`."""
+    return tuple(_triangles(b.geometry, source) if isinstance(b.geometry, Mesh) else b.geometry for b in bodies)
+
+
+def _triangles(mesh: Mesh, source: Source) -> Triangles:
+    corners = mesh.vertices[mesh.faces]
+    seen = view(source, corners)
+    centres = seen.mean(axis=1)
+    radii = np.linalg.norm(seen - centres[:, None], axis=2).max(axis=1)
+    if source.is_plane:
+        wide = WIDE * float(np.ptp(seen, axis=(0, 1)).max())
+    else:
+        wide = WIDE
+        # a triangle near the source sags: its directions leave the chord's ball by less than its radius squared
+        radii = np.where(radii > 0.8, np.inf, radii * (1 + radii))
+    # few triangles much larger than most would make the tree's search wide for all
+    wide = min(wide, 8 * float(np.median(radii)))
+    return Triangles(corners, Balls(centres, radii * (1 + 1e-9) + 1e-12, wide))
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,26 +94,27 @@ class Queries:
         return Queries(self.x[which], self.body[which], self.faces[which])
 
 
-def hidden(bodies: tuple[Body, ...], source: Source, queries: Queries) -> NDArray[np.bool_]:
+def hidden(obstacles: tuple[Obstacle, ...], source: Source, queries: Queries) -> NDArray[np.bool_]:
     """Whether something stands between each point and the source."""
     result = np.zeros(len(queries.x), bool)
     size = max((float(np.ptp(queries.x, axis=0).max()), 1e-300)) if len(queries.x) else 1.0
     least = TOUCHING * (size if source.is_plane else 1.0)
-    for number, body in enumerate(bodies):
+    for number, obstacle in enumerate(obstacles):
         rest = np.flatnonzero(~result)
         if not len(rest):
             break
         open_ = queries[rest]
         own = open_.body == number
-        if isinstance(body.geometry, Mesh):
-            result[rest] = _by_mesh(body.geometry, source, open_, own, least)
+        if isinstance(obstacle, Triangles):
+            for point, t in _meetings(obstacle, source, open_, own):
+                result[rest[point[_between(source, t, least)]]] = True
         else:
             other = rest[~own]
             x = queries.x[other]
-            if isinstance(body.geometry, Sphere):
-                result[other] = _by_sphere(body.geometry, source, x, least)
+            if isinstance(obstacle, Sphere):
+                result[other] = _by_sphere(obstacle, source, x, least)
             else:
-                result[other] = _by_disk(body.geometry, source, x, least)
+                result[other] = _by_disk(obstacle, source, x, least)
     return result
 
 
@@ -83,46 +123,32 @@ def _between(source: Source, t: Reals, least: float) -> NDArray[np.bool_]:
     return (t > least) & (t < (np.inf if source.is_plane else 1.0))
 
 
-def behind(body: Body, source: Source, queries: Queries) -> Reals:
+def behind(obstacle: Obstacle, source: Source, queries: Queries) -> Reals:
     """How far behind each point, away from the source, its own body comes next [scene units]; inf where it does not."""
     result = np.full(len(queries.x), np.inf)
-    if not isinstance(body.geometry, Mesh):
+    if not isinstance(obstacle, Triangles):
         return result
     own = np.ones(len(queries.x), bool)
-    for point, t in _meetings(body.geometry, source, queries, own):
+    for point, t in _meetings(obstacle, source, queries, own):
         away = t < -TOUCHING
         length = np.linalg.norm(toward(source, queries.x[point]), axis=1)
         np.minimum.at(result, point[away], (-t * length)[away])
     return result
 
 
-def _by_mesh(mesh: Mesh, source: Source, queries: Queries, own: NDArray[np.bool_], least: float) -> NDArray[np.bool_]:
-    result = np.zeros(len(queries.x), bool)
-    for point, t in _meetings(mesh, source, queries, own):
-        result[point[_between(source, t, least)]] = True
-    return result
-
-
-def _meetings(mesh: Mesh, source: Source, queries: Queries, own: NDArray[np.bool_]) -> Iterator[tuple[Integers, Reals]]:
+def _meetings(
+    mesh: Triangles, source: Source, queries: Queries, own: NDArray[np.bool_]
+) -> Iterator[tuple[Integers, Reals]]:
     """Where lines x + t·toward meet triangles, in parts: which query, and t. Triangles beside an edge do not count."""
-    corners = mesh.vertices[mesh.faces]
-    seen = view(source, corners)
-    centres = seen.mean(axis=1)
-    radii = np.linalg.norm(seen - centres[:, None], axis=2).max(axis=1)
-    if source.is_plane:
-        wide = WIDE * max(float(np.ptp(queries.x, axis=0).max()), 1e-300)
-    else:
-        wide = WIDE
-        # a triangle near the source sags: its directions leave the chord's ball by less than its radius squared
-        radii = np.where(radii > 0.8, np.inf, radii * (1 + radii))
-    face, point = overlaps(centres, radii, view(source, queries.x), 1e-12, wide)
-    beside = own[point] & (queries.faces[point] == face[:, None]).any(axis=1)
-    face, point = face[~beside], point[~beside]
-    for part in np.array_split(np.arange(len(face)), len(face) // 1_000_000 + 1):
-        f, p = face[part], point[part]
-        t = meeting(corners[f], queries.x[p], toward(source, queries.x[p]))
+    for first in range(0, len(queries.x), PART):
+        part = slice(first, first + PART)
+        face, point = mesh.balls.holding(view(source, queries.x[part]))
+        point += first
+        beside = own[point] & (queries.faces[point] == face[:, None]).any(axis=1)
+        face, point = face[~beside], point[~beside]
+        t = meeting(mesh.corners[face], queries.x[point], toward(source, queries.x[point]))
         met = np.isfinite(t)
-        yield p[met], t[met]
+        yield point[met], t[met]
 
 
 def meeting(corners: Reals, x: Reals, w: Reals) -> Reals:

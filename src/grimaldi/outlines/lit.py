@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from grimaldi.outlines.candidate import Candidates, toward
-from grimaldi.outlines.hidden import WIDE, Queries, hidden, overlaps, view
+from grimaldi.outlines.hidden import WIDE, Balls, Obstacle, Queries, hidden, view
 from grimaldi.outlines.model import Integers, Reals
-from grimaldi.scene.model import Body, Source
+from grimaldi.scene.model import Source
 
 SAMPLES = (0.03, 0.5, 0.97)  # of each stretch between two crossings
 HALVINGS = 40
@@ -33,7 +33,9 @@ class Stretches:
         return Stretches(self.candidate[which], self.low[which], self.high[which])
 
 
-def lit_parts(bodies: tuple[Body, ...], source: Source, edges: Candidates, body: Integers, longest: Reals) -> Stretches:
+def lit_parts(
+    obstacles: tuple[Obstacle, ...], source: Source, edges: Candidates, body: Integers, longest: Reals
+) -> Stretches:
     """What the source reaches of the candidates, in order along them.
 
     body (n,): whose edges they are; longest (n,): no stretch of an edge comes out longer than this. Whether the
@@ -45,7 +47,7 @@ def lit_parts(bodies: tuple[Body, ...], source: Source, edges: Candidates, body:
     def reached(stretches: Stretches, at: Reals) -> NDArray[np.bool_]:
         c = stretches.candidate
         x = edges.start[c] + at[:, None] * (edges.end[c] - edges.start[c])
-        return ~hidden(bodies, source, Queries(x, body[c], edges.faces[c]))
+        return ~hidden(obstacles, source, Queries(x, body[c], edges.faces[c]))
 
     parts = []
     places = [all_.low + f * (all_.high - all_.low) for f in SAMPLES]
@@ -78,8 +80,8 @@ def _crossings(source: Source, edges: Candidates) -> tuple[Integers, Reals]:
     scale = 1.0 if not source.is_plane else max(float(np.ptp(centres, axis=0).max()), 1e-300)
     wide = WIDE * scale
     radii = radii * (1 + radii / scale) + 1e-12 * scale
-    widest = float(radii[radii <= wide].max(initial=0.0))
-    i, j = overlaps(centres, radii, centres, widest, wide)
+    balls = Balls(centres, radii, wide)
+    i, j = balls.holding(centres, balls.widest)
     i, j = np.concatenate([i, j]), np.concatenate([j, i])  # a wide edge finds the narrow ones, not they it
     shared = (edges.start[i] == edges.end[j]).all(1) | (edges.end[i] == edges.start[j]).all(1)
     keep = (i != j) & ~shared
