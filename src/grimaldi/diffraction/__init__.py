@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from grimaldi.conventions import ModelName, did_you_mean
 from grimaldi.diffraction.model import Model
 from grimaldi.errors import InputError
 
@@ -9,12 +10,12 @@ from grimaldi.errors import InputError
 def model(name: str) -> Model:
     """The model called `name`: "boundary" or "none".
 
-    Raises InputError for any other name.
+    Raises InputError for any other name, with the nearest of these.
     """
     from grimaldi.diffraction.boundary import boundary
     from grimaldi.diffraction.none import none
 
-    models: dict[str, Model] = {"boundary": boundary, "none": none}
+    models: dict[ModelName, Model] = {"boundary": boundary, "none": none}
     if name not in models:
-        raise InputError(f"diffraction: {name!r} is no model; use one of {', '.join(models)}")
+        raise InputError(f"diffraction: {name!r} is no model; {did_you_mean(name, models)}")
     return models[name]

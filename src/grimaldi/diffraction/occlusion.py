@@ -43,8 +43,9 @@ class Rays(NamedTuple):
         assert self.source.direction is not None
         return constant(mi.Vector3f, -self.source.direction)
 
-    def lit(self, origin: Any, active: Any) -> Any:
-        """Whether nothing stands between points and the source."""
+    def lit(self, p: Any, active: Any) -> Any:
+        """Whether nothing stands between points and the source; in a corner two surfaces meet at p."""
+        origin = p + self.epsilon(p) * self.toward(p)
         if self.source.position is not None:
             return self.clear(origin, constant(mi.Point3f, self.source.position), active)
         return ~self.blockers.ray_test(mi.Ray3f(origin, self.toward(origin)), active)
@@ -67,14 +68,14 @@ class Rays(NamedTuple):
         margin = dr.minimum(4 * epsilon + across / dr.maximum(dr.abs(depth), GRAZING), 0.5 * length)
         end = length - margin
         hit = self.blockers.ray_intersect_preliminary(
-            mi.Ray3f(p, d, end, 0, mi.Color0f()), coherent=True, active=active
+            mi.Ray3f(p + epsilon * d, d, dr.maximum(end - epsilon, 0), 0, mi.Color0f()), coherent=True, active=active
         )
         blocked = hit.is_valid()
-        left = end - hit.t
+        left = end - epsilon - hit.t
         inside = (piece.closed > 0.5) & (depth > 0) & (left < piece.behind)
         blocked &= (piece.closed < 0.5) | (dr.abs(depth) > GRAZING) | (left > 8 * piece.reach)
         if active & blocked & inside:
-            start = hit.t + margin
+            start = end - left + margin
             more = end > start  # a ray of negative length would count as blocked
             blocked = more & self.blockers.ray_test(
                 mi.Ray3f(p + start * d, d, dr.maximum(end - start, 0), 0, mi.Color0f()), True, active & more
