@@ -47,6 +47,9 @@ def test_wavelengths_in_scene_units(wavelength: Any, scene_unit: str | None, exp
         ("nan", None, "wavelength: 'nan' is not positive"),
         ("-inf", None, "wavelength: '-inf'"),
         ("1e-400", None, "wavelength: '1e-400' is not positive"),
+        (1e-320, None, "wavelength: 1e-320 is out of reach; give one from 1e-18 to 1e+18 scene units"),
+        ("1e40", None, "wavelength: '1e40' is out of reach"),
+        ("1 nm", "1e30 km", "wavelength: '1 nm' is out of reach"),
         ("0 nm", "1 um", "wavelength: '0 nm' is not positive"),
         ([0.4, -1], None, "wavelength: -1 is not positive"),
         ([], None, "wavelength: the list is empty"),
@@ -80,7 +83,7 @@ def test_wrong_wavelengths_say_what_and_why(wavelength: Any, scene_unit: Any, na
 
 def test_a_misspelt_option_names_the_nearest() -> None:
     check_options(["tolerance", "n"], ["n", "tolerance"])
-    with pytest.raises(InputError, match="tolerence: no such option; did you mean tolerance"):
+    with pytest.raises(InputError, match="tolerence: no such option; did you mean 'tolerance'"):
         check_options(["tolerence"], ["n", "precision", "tolerance"])
     with pytest.raises(InputError, match="xyz: no such option; known are n, precision"):
         check_options(["xyz"], ["precision", "n"])

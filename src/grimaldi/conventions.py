@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterable, Sequence
 from difflib import get_close_matches
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from grimaldi.errors import InputError
 
@@ -17,6 +17,9 @@ if TYPE_CHECKING:
 SIGNS = "exp(-i omega t): U = A exp(i phase) exp(+i k R)/R, so phase grows with the distance from the source"
 
 Wavelength = float | str | Sequence[float | str]
+ModelName = Literal["none", "boundary"]
+
+_SHORTEST, _LONGEST = 1e-18, 1e18  # scene units; beyond them phases overflow or divide by zero
 
 # A number, then perhaps one unit's name: pint's own expressions ("2**9**9 nm") are none of our business.
 _QUANTITY = re.compile(r"\s*(?P<number>[-+]?(?:\d[\d_]*\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)?\s*(?P<unit>[^\W\d_]+)?\s*")
@@ -31,8 +34,8 @@ def parse_wavelengths(wavelength: Wavelength, scene_unit: str | None = None) -> 
         scene_unit: length of one scene unit as text ("1 um", or "um"); needed for text with a unit.
 
     Raises:
-        InputError: naming `wavelength` or `scene_unit`: no positive finite number, an unknown unit, a
-            unit that is no length, a unit without `scene_unit`, or none at all.
+        InputError: naming `wavelength` or `scene_unit`: no positive finite number, one outside 1e-18 to 1e18
+            scene units, an unknown unit, a unit that is no length, a unit without `scene_unit`, or none at all.
     """
     scale = None if scene_unit is None else _scene_unit(scene_unit)
     if isinstance(wavelength, str):
@@ -52,9 +55,16 @@ def check_options(given: Iterable[str], allowed: Iterable[str]) -> None:
     allowed = sorted(allowed)
     for name in given:
         if name not in allowed:
-            nearest = get_close_matches(name, allowed, n=1, cutoff=0.5)
-            advice = f"did you mean {nearest[0]}?" if nearest else f"known are {', '.join(allowed)}"
-            raise InputError(f"{name}: no such option; {advice}")
+            raise InputError(f"{name}: no such option; {did_you_mean(name, allowed)}")
+
+
+def did_you_mean(name: object, known: Iterable[str], otherwise: str | None = None) -> str:
+    """Advice on a name that is not `known`: the nearest that is, else `otherwise`, or else all of them."""
+    known = tuple(known)
+    nearest = get_close_matches(str(name), known, n=1, cutoff=0.5)
+    if nearest:
+        return f"did you mean {nearest[0]!r}?"
+    return otherwise or f"known are {', '.join(known)}"
 
 
 def _one(item: Any, scale: tuple[float, str] | None) -> float:
@@ -81,6 +91,10 @@ def _one(item: Any, scale: tuple[float, str] | None) -> float:
         value = _convert("wavelength", value, unit, scale[1]) / scale[0]
     if not (math.isfinite(value) and value > 0):
         raise InputError(f"wavelength: {item!r} is not positive and finite; give a length above zero")
+    if not _SHORTEST <= value <= _LONGEST:
+        raise InputError(
+            f"wavelength: {item!r} is out of reach; give one from {_SHORTEST:g} to {_LONGEST:g} scene units"
+        )
     return value
 
 

@@ -6,7 +6,7 @@ import math
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any, get_args
 
-from grimaldi.conventions import SIGNS
+from grimaldi.conventions import SIGNS, did_you_mean
 from grimaldi.errors import InputError
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ def checked_options(tolerance: Any, precision: Any, occlusion: Any = True) -> Op
     if not 1e-12 <= tolerance < 1 or not math.isfinite(tolerance):
         raise InputError(f"tolerance: {tolerance:g} is out of reach; give a number from 1e-12 to 1")
     if precision not in get_args(Precision):
-        raise InputError(f"precision: {precision!r} is unknown; give one of {', '.join(get_args(Precision))}")
+        raise InputError(f"precision: {precision!r} is unknown; {did_you_mean(precision, get_args(Precision))}")
     return Options(tolerance, precision, bool(occlusion))
 
 

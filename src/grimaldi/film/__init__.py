@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from difflib import get_close_matches
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from grimaldi.conventions import did_you_mean
 from grimaldi.errors import InputError
 from grimaldi.files import check_writable
 from grimaldi.film import exr, png
@@ -46,8 +46,7 @@ def check(path: str | Path, view: str = "picture", *, exposure: float | None = N
     if path.suffix.lower() not in (".exr", ".png"):
         raise InputError(f"{path}: unknown kind of picture {path.suffix!r}; end the name in .exr or .png")
     if view not in png.VIEWS:
-        near = get_close_matches(view, png.VIEWS, n=1, cutoff=0.0)[0]
-        raise InputError(f"view: no view {view!r}; did you mean {near!r}? ({', '.join(png.VIEWS)})")
+        raise InputError(f"view: no view {view!r}; {did_you_mean(view, png.VIEWS)}")
     if path.suffix.lower() == ".exr" and view != "picture":
         raise InputError(f"view: {path} holds every layer, so it takes no view {view!r}; write a .png for one")
     if exposure is not None and not 0 < exposure < float("inf"):

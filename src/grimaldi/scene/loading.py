@@ -6,10 +6,10 @@ import warnings
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
-from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
+from grimaldi.conventions import did_you_mean
 from grimaldi.errors import GrimaldiWarning, InputError
 from grimaldi.scene.bodies import blockers, sort_shapes
 from grimaldi.scene.checking import check_nodes, check_scene
@@ -125,8 +125,7 @@ def _builtin(name: str) -> dict[str, Any]:
         return builtin.build(name)
     if Path(name).is_dir():
         raise InputError(f"{name}: is a folder; name the scene's XML file in it")
-    nearest = get_close_matches(name, names, n=1)
-    advice = f"did you mean {nearest[0]!r}?" if nearest else f"built-in scenes are {', '.join(names)}"
+    advice = did_you_mean(name, names, otherwise=f"built-in scenes are {', '.join(names)}")
     raise InputError(f"{name}: no such file or built-in scene; {advice}")
 
 

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import re
-from difflib import get_close_matches
 from functools import cache
 from pathlib import Path
+
+from grimaldi.conventions import did_you_mean
 
 _SOURCE_LINE = re.compile(r"\[[\w.]+\.(?:cpp|h|inl):\d+\]\s*")
 _CLASS = re.compile(r"\[[A-Z]\w+\] ")
@@ -51,7 +52,8 @@ def _what(text: str) -> str:
         return own["message"]
     of = f" of {kind['type']!r}" if (kind := _INSTANTIATE.match(text)) else ""
     if match := _UNKNOWN_PLUGIN.search(text):
-        return f"unknown plugin {match['name']!r}; {_nearest(match['name'])}"
+        advice = did_you_mean(match["name"], _plugin_names(), otherwise="check its spelling")
+        return f"unknown plugin {match['name']!r}; {advice}"
     if match := _UNREFERENCED.search(text):
         names = ", ".join(repr(name) for name in _PROPERTY.findall(match["list"]))
         plugin = match["plugin"].rsplit('"', 2)[-2] if '"' in match["plugin"] else match["plugin"]
@@ -65,11 +67,6 @@ def _what(text: str) -> str:
         return f"the mesh{of} is empty; give it at least one triangle"
     said = _CLASS.sub("", _INSTANTIATE.sub(lambda match: f"{match['type']!r}: ", text)).rstrip(" .!")
     return f"{said}; correct it there"
-
-
-def _nearest(name: str) -> str:
-    nearest = get_close_matches(name, _plugin_names(), n=1)
-    return f"did you mean {nearest[0]!r}?" if nearest else "check its spelling"
 
 
 @cache

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable
-from difflib import get_close_matches
 from typing import Any
 
+from grimaldi.conventions import did_you_mean
 from grimaldi.errors import InputError
 from grimaldi.scene.builtin import arago, creature, knife_edge, slit, young
 
@@ -35,11 +35,9 @@ def build(name: str, **parameters: float) -> dict[str, Any]:
         InputError: no such scene, or no such parameter of it.
     """
     if name not in _SCENES:
-        near = get_close_matches(name, _SCENES, n=1, cutoff=0.0)[0]
-        raise InputError(f"{name}: no built-in scene; did you mean {near!r}? ({', '.join(_SCENES)})")
+        raise InputError(f"{name}: no built-in scene; {did_you_mean(name, _SCENES)}")
     known = inspect.signature(_SCENES[name]).parameters
     for parameter in parameters:
         if parameter not in known:
-            near = get_close_matches(parameter, known, n=1, cutoff=0.0)[0]
-            raise InputError(f"{name}: no parameter {parameter!r}; did you mean {near!r}?")
+            raise InputError(f"{name}: no parameter {parameter!r}; {did_you_mean(parameter, known)}")
     return _SCENES[name](**parameters)
