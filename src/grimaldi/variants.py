@@ -14,12 +14,13 @@ from grimaldi.errors import InputError
 def ensure_variant(kind: Literal["rgb", "mono"]) -> str:
     """The name of Mitsuba's variant, set to the best one of `kind` if none is set yet.
 
-    Raises InputError where that variant needs a libLLVM and none works: older ones than 17 abort the
-    process in the middle of a kernel.
+    Raises InputError where waves cannot be computed in that variant, and where it needs a libLLVM and
+    none works: older ones than 17 abort the process in the middle of a kernel.
     """
     import mitsuba as mi
 
     name = mi.variant() or best_variant(kind)
+    check_variant(name)
     if name.startswith("llvm"):
         problem = libllvm_problem()
         if problem is not None:
@@ -27,6 +28,14 @@ def ensure_variant(kind: Literal["rgb", "mono"]) -> str:
     if mi.variant() is None:
         mi.set_variant(name)
     return name
+
+
+def check_variant(name: str) -> None:
+    """Raise InputError unless waves can be computed in the variant: scalar, spectral and polarized ones cannot."""
+    if name.startswith("scalar") or "spectral" in name or "polarized" in name:
+        raise InputError(
+            f"variant {name}: waves need an llvm or cuda variant in rgb or mono; use llvm_ad_rgb or llvm_ad_mono"
+        )
 
 
 def best_variant(kind: Literal["rgb", "mono"]) -> str:

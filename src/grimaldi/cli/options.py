@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 
 import typer
 
+from grimaldi.conventions import ModelName
 from grimaldi.errors import InputError
 
 Scene = Annotated[
@@ -25,7 +26,7 @@ SceneUnit = Annotated[
     typer.Option(help="Length of one scene unit ('1 um'); for wavelengths with a unit.", metavar="LENGTH"),
 ]
 Diffraction = Annotated[
-    Literal["none", "boundary"] | None,
+    ModelName | None,
     typer.Option(help="The model of diffraction.  [default: boundary]"),
 ]
 Interference = Annotated[
@@ -59,10 +60,12 @@ def set_variant(name: str | None) -> None:
         return
     import mitsuba as mi
 
-    from grimaldi.conventions import check_options
-    from grimaldi.variants import ensure_variant
+    from grimaldi.conventions import did_you_mean
+    from grimaldi.variants import check_variant, ensure_variant
 
-    check_options([name], mi.variants())
+    if name not in mi.variants():
+        raise InputError(f"--variant: no variant {name!r}; {did_you_mean(name, mi.variants())}")
+    check_variant(name)
     try:
         mi.set_variant(name)
     except ImportError:
