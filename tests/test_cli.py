@@ -31,6 +31,12 @@ SCENE = """
     </shape>
 </scene>
 """
+FAR = """
+<scene version="3.0.0">
+    <emitter type="point" id="lamp"><point name="position" x="1e20" y="0" z="0"/></emitter>
+    <shape type="sphere"/>
+</scene>
+"""
 PLANE = "-3,-3,9; 3,-3,9; -3,3,9; 4x3"
 
 
@@ -70,7 +76,12 @@ def said(done: subprocess.CompletedProcess[str]) -> str:
         (["render", "young", "-o", "x.png", "--size", "0x30"], "--size: '0x30'"),
         (["render", "young", "-o", "x.png", "--spp", "many"], "--spp"),
         (["render", "young", "-o", "x.png", "--diffraction", "boundry"], "boundary"),
-        (["render", "young", "-o", "x.png", "--variant", "llvm_rgb"], "llvm_ad_rgb"),
+        (["render", "young", "-o", "x.png", "--variant", "llvm_rgb"], "did you mean 'llvm_ad_rgb'"),
+        (["render", "young", "-o", "x.png", "--variant", "scalar_rgb"], "variant scalar_rgb: waves need"),
+        (["render", "young", "-o", "x.png", "--variant", "llvm_ad_spectral"], "variant llvm_ad_spectral: waves need"),
+        (["outline", "arago", "-o", "x.svg", "--variant", "scalar_rgb"], "variant scalar_rgb: waves need"),
+        (["field", "arago", "-o", "x.npz", "--plane", PLANE, "--wavelength", "1e-320"], "wavelength: '1e-320'"),
+        (["field", "far.xml", "-o", "x.npz", "--plane", PLANE, "--wavelength", "1"], "far.xml: lamp: position is too"),
         (["field", "young", "-o", "x.npz"], "--points"),
         (["field", "young", "-o", "x.npz", "--points", "p.npy", "--plane", PLANE], "--points"),
         (["field", "young", "-o", "x.npz", "--points", "missing.npy"], "missing.npy: cannot be read"),
@@ -91,6 +102,7 @@ def said(done: subprocess.CompletedProcess[str]) -> str:
 )
 def test_wrong_usage_is_one_line_and_writes_nothing(tmp_path: Path, arguments: list[str], named: str) -> None:
     (tmp_path / "words.csv").write_text("x,y,z\n1,2,three\n")
+    (tmp_path / "far.xml").write_text(FAR)
     (tmp_path / "words.zarr").write_text("not a folder")
     (tmp_path / "folder.nc").mkdir()
     (tmp_path / "two.csv").write_text("1,2\n")

@@ -83,6 +83,7 @@ def serialized(face: Sequence[int]) -> bytes:
         (binary(moved(np.nan), [[0, 1, 2]]), r"vertex 2 is at \(0, nan, 0\)"),
         (binary(moved(-np.inf), [[0, 1, 2]]), r"vertex 2 is at \(0, -inf, 0\)"),
         (binary(moved(1e30), [[0, 1, 2]]), r"vertex 2 is at \(0, 1e\+30, 0\)"),
+        (binary(moved(1e20), [[0, 1, 2]]), r"vertex 2 is at \(0, 1e\+20, 0\); give finite coordinates below 1e\+18"),
         (binary(CORNERS[:0], []), "the mesh is empty"),
         (binary(CORNERS, []), "the mesh is empty"),
         (text("0 0 0\n1 0 0\n0 1 0\n3 0 1 9\n"), "face 0 joins vertices 0, 1, 9"),
@@ -164,6 +165,8 @@ def test_an_edge_of_three_faces_is_named_and_loaded(tmp_path: Path):
 
 BOX = '<shape type="cube" id="box">{}</shape>\n<emitter type="point" id="lamp">{}</emitter>'
 INSIDE = '<point name="position" x="0.5" y="0" z="0"/>'
+FAR = '<emitter type="{}" id="lamp"><point name="position" x="1e20" y="0" z="0"/></emitter>'
+FLAT = '<shape type="{}" id="plate"><transform name="to_world"><scale x="0"/></transform></shape>'
 FLIPPED = '<boolean name="flip_normals" value="true"/>'
 MIRRORED = '<transform name="to_world"><scale x="-1"/></transform>'
 
@@ -217,6 +220,39 @@ MIRRORED = '<transform name="to_world"><scale x="-1"/></transform>'
             '<film type="hdrfilm"><integer name="width" value="2147483647"/></film>',
             "line 2: a film of 2147483647 × 576 pixels",
         ),
+        (
+            '<film type="hdrfilm"><string name="width" value="wide"/></film>',
+            "scene.xml, line 2: width is 'wide'; give a whole number",
+        ),
+        (
+            '<film type="hdrfilm"><integer name="height" value="0"/></film>',
+            "scene.xml, line 2: a film of 768 × 0 pixels; give at least 1 × 1",
+        ),
+        (
+            '<film type="hdrfilm"><integer name="width" value="-4"/><integer name="height" value="-4"/></film>',
+            "scene.xml, line 2: a film of -4 × -4 pixels; give at least 1 × 1",
+        ),
+        (
+            '<shape type="serialized"><string name="filename" value="scene.xml"/>\n'
+            '<string name="shape_index" value="first"/></shape>',
+            "scene.xml, line 2: shape_index is 'first'; give a whole number",
+        ),
+        (
+            '<emitter type="directional"><vector name="direction" x="0" y="0" z="0"/></emitter>',
+            "scene.xml, line 2: directional: direction is zero",
+        ),
+        (
+            '<emitter type="directional" id="sun"><transform name="to_world"><scale value="0"/></transform></emitter>',
+            "sun: direction is zero",
+        ),
+        (
+            '<emitter type="directional" id="sun"><vector name="direction" x="nan" y="0" z="0"/></emitter>',
+            "sun: direction is not finite",
+        ),
+        (FAR.format("point"), "lamp: position is too large, (1e+20, 0, 0); give coordinates below 1e+18"),
+        (FAR.format("coherent_point"), "lamp: position is too large"),
+        (FLAT.format("disk"), "plate: to_world flattens the disk; give a scale that is nowhere 0"),
+        (FLAT.format("rectangle"), "plate: all faces have zero area"),
         (BOX.format("", INSIDE), "lamp: the source lies inside 'box'; move it out"),
         (
             '<shape type="sphere" id="ball"/><emitter type="point" id="lamp"/>',
@@ -303,6 +339,31 @@ def nested(depth: int) -> dict[str, Any]:
 )
 def test_what_is_no_scene(scene, says):
     assert says in refused(scene)
+
+
+# ---------------------------------------------------------------------------- options and variants
+
+
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [
+        ({"diffraction": "boundry"}, "diffraction: 'boundry' is no model; did you mean 'boundary'?"),
+        ({"diffraction": "rainbow"}, "diffraction: 'rainbow' is no model; known are boundary, none"),
+        ({"precision": "duoble"}, "precision: 'duoble' is unknown; did you mean 'double'?"),
+        ({"tolerence": 1e-3}, "tolerence: no such option; did you mean 'tolerance'?"),
+    ],
+)
+def test_misspelt_names_suggest_the_nearest(options, says):
+    with pytest.raises(InputError) as error:
+        grimaldi.field("young", [[0.0, 0.0, 1.0]], wavelength=0.5, **options)
+    assert str(error.value) == says
+
+
+@pytest.mark.parametrize("variant", ["scalar_rgb", "scalar_spectral", "llvm_ad_spectral", "llvm_ad_mono_polarized"])
+def test_variants_without_waves_are_refused(variant):
+    mi.set_variant(variant)
+    with pytest.raises(InputError, match=f"^variant {variant}: waves need an llvm or cuda variant"):
+        grimaldi.render("young", spp=1, size=(8, 8))
 
 
 # ------------------------------------------------------------------------------------- the command

@@ -17,6 +17,7 @@ from grimaldi.scene.model import Body, Mesh, Scene, Sphere
 from grimaldi.scene.ply import check_ply
 from grimaldi.scene.screen import check_screen
 from grimaldi.scene.serialized import check_serialized
+from grimaldi.scene.sources import ZERO_DIRECTION
 from grimaldi.scene.triangles import LARGEST, check_positions, check_triangles
 
 Reals = NDArray[np.float64]
@@ -40,7 +41,7 @@ def require_sensor(scene: Scene) -> None:
 
 
 def check_nodes(state: Any) -> None:
-    """Checks a parsed scene (`mi.parser.ParserState`) before Mitsuba builds it: mesh files, radii, film size.
+    """Checks a parsed scene (`mi.parser.ParserState`) before Mitsuba builds it: mesh files, radii, films, directions.
 
     Raises:
         InputError: naming the file and line.
@@ -58,13 +59,18 @@ def check_nodes(state: Any) -> None:
             if plugin == "ply":
                 check_ply(file)
             else:
-                check_serialized(file, int(props.get("shape_index", 0)))
+                check_serialized(file, _whole_number(props, "shape_index", 0, place))
         elif plugin == "sphere" and isinstance(radius := props.get("radius", None), (int, float)):
             _check_radius(radius, place)
         elif plugin == "hdrfilm":
-            width, height = props.get("width", 768), props.get("height", 576)
-            if not 0 < width * height <= LARGEST_FILM:
+            width = _whole_number(props, "width", 768, place)
+            height = _whole_number(props, "height", 576, place)
+            if width < 1 or height < 1:
+                raise InputError(f"{place}: a film of {width} × {height} pixels; give at least 1 × 1")
+            if width * height > LARGEST_FILM:
                 raise InputError(f"{place}: a film of {width} × {height} pixels; give at most 2^28 in all")
+        elif plugin == "directional" and "direction" in props and not np.array(props["direction"]).any():
+            raise InputError(f"{place}: directional: {ZERO_DIRECTION}")  # Mitsuba makes NaN of it
 
 
 def check_scene(scene: Scene) -> None:
@@ -98,9 +104,25 @@ def _check_body(body: Body) -> None:
         check_positions(geometry.centre[None], body.name)
     elif isinstance(geometry, Mesh):
         check_triangles(geometry.vertices, geometry.faces, body.name)
+        _check_area(geometry, body.name)
         _warn_of_shared_edges(geometry, body.name)
     elif not (np.abs(geometry.to_world) < LARGEST).all():
-        raise InputError(f"{body.name}: to_world is not finite; give finite numbers below 1e30")
+        raise InputError(f"{body.name}: to_world is not finite; give finite numbers below {LARGEST:g}")
+    elif np.linalg.matrix_rank(geometry.to_world[:3, :3]) < 3:
+        raise InputError(f"{body.name}: to_world flattens the disk; give a scale that is nowhere 0")
+
+
+def _check_area(mesh: Mesh, name: str) -> None:
+    a, b, c = np.moveaxis(mesh.vertices[mesh.faces], 1, 0)
+    if not np.cross(b - a, c - a).any():
+        raise InputError(f"{name}: all faces have zero area; give a scale that is nowhere 0, or export the mesh anew")
+
+
+def _whole_number(props: Any, name: str, default: int, place: str) -> int:
+    value = props.get(name, default)
+    if type(value) is not int:  # a bool is none
+        raise InputError(f"{place}: {name} is {value!r}; give a whole number")
+    return value
 
 
 def _check_radius(radius: float, place: str) -> None:

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Collection, Iterable
-from difflib import get_close_matches
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from grimaldi.conventions import did_you_mean
 from grimaldi.errors import GrimaldiWarning, InputError
 from grimaldi.scene.model import Scene, Source
+from grimaldi.scene.triangles import LARGEST
 
 COHERENT_GROUP = "0"
+ZERO_DIRECTION = "direction is zero; give the way the wave travels"
 
 _DIFFRACTING = ("coherent_point", "coherent_directional", "PointLight", "DirectionalEmitter")
 
@@ -30,8 +32,8 @@ def sources(mi_scene: Any, *, coherent: Collection[str] = ()) -> tuple[Source, .
         coherent: ids of Mitsuba's `point` and `directional` that join group "0".
 
     Raises:
-        InputError: a spectral or polarized variant; an intensity that is negative or not finite; an id in
-            `coherent` that no such emitter has.
+        InputError: a position that is not finite or too far away, a direction that is zero or not finite; an
+            intensity that is negative or not finite; an id in `coherent` that no such emitter has.
 
     Warns:
         GrimaldiWarning: naming the emitters that stay ordinary light.
@@ -41,7 +43,6 @@ def sources(mi_scene: Any, *, coherent: Collection[str] = ()) -> tuple[Source, .
     names = _unique_names(mi_scene.emitters())
     for emitter, name in zip(mi_scene.emitters(), names, strict=True):
         if diffracts(emitter):
-            _check_variant()
             found.append(_source(emitter, name, coherent))
         else:
             ordinary.append(f"{name} ({emitter.class_name()})")
@@ -69,17 +70,15 @@ def _source(emitter: Any, name: str, coherent: Collection[str]) -> Source:
     kind = _kind(emitter)
     place: dict[str, Any]
     if kind == "coherent_point":
-        place = {"position": _numbers(emitter.position)}
+        place = {"position": _checked_position(_numbers(emitter.position), name)}
     elif kind == "coherent_directional":
-        place = {"direction": _unit(_numbers(emitter.direction))}
+        place = {"direction": _unit(_numbers(emitter.direction), name)}
     elif kind == "PointLight":
-        place = {"position": _numbers(_parameter(emitter, "position"))}
+        place = {"position": _checked_position(_numbers(_parameter(emitter, "position")), name)}
     else:
         to_world = _numbers(_parameter(emitter, "to_world").matrix).reshape(4, 4)
-        place = {"direction": _unit(to_world[:3, 2]), "origin": to_world[:3, 3].copy()}
-    for what, value in place.items():
-        if not np.isfinite(value).all():
-            raise InputError(f"{name}: {what} is not finite; give numbers, not all 0 in a direction")
+        direction = _unit(to_world[:3, 2], name)
+        place = {"direction": direction, "origin": _checked_position(to_world[:3, 3].copy(), name)}
     if kind in ("PointLight", "DirectionalEmitter"):
         wave = _from_power(_power(emitter, name), COHERENT_GROUP if name in coherent else name)
     else:
@@ -134,7 +133,18 @@ def _numbers(value: Any) -> NDArray[np.float64]:
     return np.array(value, dtype=np.float64).reshape(-1)
 
 
-def _unit(direction: NDArray[np.float64]) -> NDArray[np.float64]:
+def _checked_position(position: NDArray[np.float64], name: str) -> NDArray[np.float64]:
+    if not (np.abs(position) < LARGEST).all():  # negated, so that NaN counts as bad
+        wrong = f"too large, ({', '.join(f'{x:g}' for x in position)})" if np.isfinite(position).all() else "not finite"
+        raise InputError(f"{name}: position is {wrong}; give coordinates below {LARGEST:g}")
+    return position
+
+
+def _unit(direction: NDArray[np.float64], name: str) -> NDArray[np.float64]:
+    if not np.isfinite(direction).all():
+        raise InputError(f"{name}: direction is not finite; give three numbers, not all 0")
+    if not direction.any():
+        raise InputError(f"{name}: {ZERO_DIRECTION}")
     return direction / np.linalg.norm(direction)
 
 
@@ -142,13 +152,6 @@ def _channels() -> int:
     import mitsuba as mi
 
     return 1 if mi.is_monochromatic else 3
-
-
-def _check_variant() -> None:
-    import mitsuba as mi
-
-    if mi.is_spectral or mi.is_polarized:
-        raise InputError(f"variant {mi.variant()}: waves are computed in mono and rgb variants; set 'llvm_ad_rgb', say")
 
 
 def _unique_names(emitters: Iterable[Any]) -> list[str]:
@@ -169,8 +172,7 @@ def _unique_names(emitters: Iterable[Any]) -> list[str]:
 def _check_ids(coherent: Collection[str], names: list[str]) -> None:
     for name in coherent:
         if name not in names:
-            nearest = get_close_matches(name, names, n=1)
-            advice = f"did you mean {nearest[0]!r}?" if nearest else f"the scene has {', '.join(names) or 'none'}"
+            advice = did_you_mean(name, names, otherwise=f"the scene has {', '.join(names) or 'none'}")
             raise InputError(f"coherent: no source has the id {name!r}; {advice}")
 
 
@@ -185,6 +187,6 @@ def pick_source(scene: Scene, name: str | None = None) -> Source:
     if name is None:
         raise InputError(f"{scene.name}: has {len(names)} sources; name one of {', '.join(names)}")
     if name not in names:
-        nearest = get_close_matches(name, names, n=1, cutoff=0.0) or ["none"]
-        raise InputError(f"{scene.name}: has no source {name!r}; the nearest is {nearest[0]}")
+        advice = did_you_mean(name, names, otherwise=f"the scene has {', '.join(names) or 'none'}")
+        raise InputError(f"{scene.name}: has no source {name!r}; {advice}")
     return scene.sources[names.index(name)]

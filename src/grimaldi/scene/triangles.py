@@ -7,13 +7,13 @@ from numpy.typing import NDArray
 
 from grimaldi.errors import InputError
 
-LARGEST = 1e30  # beyond it Float32 geometry overflows when squared
+LARGEST = 1e18  # beyond it squared distances overflow in Float32
 
 
 def check_triangles(positions: NDArray[np.floating], faces: NDArray[np.integer], place: str) -> None:
     """Raises InputError naming the first vertex (n, 3) or face (m, 3) that Mitsuba cannot take.
 
-    Vertices must be finite and below 1e30, faces name vertices that exist, and there must be some.
+    Vertices must be finite and below `LARGEST`, faces name vertices that exist, and there must be some.
     """
     if not len(positions) or not len(faces):
         raise InputError(f"{place}: the mesh is empty; give it at least one triangle")
@@ -28,9 +28,9 @@ def check_triangles(positions: NDArray[np.floating], faces: NDArray[np.integer],
 
 
 def check_positions(positions: NDArray[np.floating], place: str) -> None:
-    """Raises InputError naming the first of the (n, 3) positions that is not finite, or beyond 1e30."""
+    """Raises InputError naming the first of the (n, 3) positions that is not finite, or beyond `LARGEST`."""
     bad = ~(np.abs(positions) < LARGEST).all(axis=1)  # negated, so that NaN counts as bad
     if bad.any():
         i = int(np.flatnonzero(bad)[0])
         coordinates = ", ".join(f"{x:g}" for x in positions[i])
-        raise InputError(f"{place}: vertex {i} is at ({coordinates}); give finite coordinates below 1e30")
+        raise InputError(f"{place}: vertex {i} is at ({coordinates}); give finite coordinates below {LARGEST:g}")
