@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import subprocess
 import sys
 
 import pytest
@@ -47,3 +48,22 @@ def test_a_short_job_shows_nothing(monkeypatch: pytest.MonkeyPatch, clock: list[
 
 def test_nothing_is_shown_where_there_is_no_terminal(monkeypatch: pytest.MonkeyPatch, clock: list[float]) -> None:
     assert written(monkeypatch, io.StringIO(), clock, 20.0) == ""
+
+
+def test_an_interrupt_that_got_lost_is_raised_at_the_next_step():
+    code = """
+import signal, time
+from grimaldi.engine import interrupt
+from grimaldi.engine.progress import progress
+interrupt.listen()
+try:
+    signal.raise_signal(signal.SIGINT)
+except KeyboardInterrupt:
+    pass  # swallowed, as a callback from C++ may do
+with progress(2, "work") as advance:
+    advance(1)
+print("went on")
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert "KeyboardInterrupt" in done.stderr
+    assert "went on" not in done.stdout

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 
 from grimaldi.cli.messages import fail, one_line_each
+from grimaldi.engine.interrupt import listen
 from grimaldi.errors import InputError
 
 INTERRUPTED = 130
@@ -12,6 +13,7 @@ INTERRUPTED = 130
 
 def main() -> None:
     """Run the command line and exit: 0 done, 2 wrong input (one line), 130 interrupted, 1 anything else."""
+    listen()
     sys.exit(_run(sys.argv[1:]))
 
 

@@ -7,15 +7,18 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from time import monotonic
 
+from grimaldi.engine.interrupt import check
+
 
 @contextmanager
 def progress(total: int, label: str) -> Iterator[Callable[[int], None]]:
     """A bar of `total` steps with the time left on stderr; yields `advance(n)`.
 
-    It shows after the first second, and never where stderr is not a terminal.
+    It shows after the first second, and never where stderr is not a terminal. `advance` raises
+    KeyboardInterrupt where Ctrl-C was pressed and the exception got lost.
     """
     if not sys.stderr.isatty():
-        yield lambda _: None
+        yield lambda _: check()
         return
 
     from rich.console import Console
@@ -33,6 +36,7 @@ def progress(total: int, label: str) -> Iterator[Callable[[int], None]]:
     begun = monotonic()
 
     def advance(steps: int) -> None:
+        check()
         bar.advance(task, steps)
         if not bar.live.is_started and monotonic() - begun > 1:
             bar.start()
