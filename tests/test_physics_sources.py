@@ -95,3 +95,15 @@ def test_lights_of_mitsuba_are_incoherent_with_amplitude_root_of_intensity():
     assert result.sizes["group"] == 3
     squares = [((points - [x, 0, 0]) ** 2).sum(axis=1) for x in (1, -1)]
     np.testing.assert_allclose(result.intensity, 4 / squares[0] + 9 / squares[1] + 0.25, rtol=1e-6)
+
+
+def test_a_field_is_finite_however_short_the_wave():
+    """Phases of 1e10 radians: |U| past a ball stays at most a few times |U0|."""
+    scene = {
+        "type": "scene",
+        "light": {"type": "coherent_point", "position": [0, 0, 5]},
+        "ball": {"type": "sphere"},
+    }
+    points = np.array([[0, 0, -5], [2, 0, -5], [9, 0, -5.0]])
+    field = grimaldi.field(scene, points, wavelength=1e-9)
+    assert abs(field.U.values).max() < 1

@@ -18,6 +18,11 @@ mi.set_variant("llvm_ad_rgb")
 T = mi.ScalarTransform4f
 
 
+@pytest.fixture(autouse=True)
+def rgb():
+    mi.set_variant("llvm_ad_rgb")
+
+
 def room(integrator: dict, **more) -> dict:
     """A floor, a glossy ball, a diffuse box; a point light unless `more` brings others."""
     lights = more or {

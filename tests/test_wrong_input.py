@@ -385,3 +385,11 @@ def test_the_command_says_one_line_and_exits_with_2(tmp_path: Path, broken):
     (line,) = done.stderr.splitlines()
     assert ("mesh.ply: face 0" if broken == "mesh" else "scene.xml, line 3: malformed XML") in line
     assert sorted(path.name for path in tmp_path.iterdir()) == ["mesh.ply", "scene.xml"]
+
+
+def test_field_takes_the_scenes_own_wavelength_or_says_that_there_is_none():
+    lamp = {"type": "coherent_point", "position": [0, 0, 1]}
+    own = {"type": "scene", "lamp": lamp, "waves": {"type": "wave", "wavelength": 0.25}}
+    assert grimaldi.field(own, [0, 0, 0]).wavelength.values == [0.25]
+    with pytest.raises(InputError, match="wavelength: there is none"):
+        grimaldi.field({"type": "scene", "lamp": lamp}, [0, 0, 0])

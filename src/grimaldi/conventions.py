@@ -25,7 +25,7 @@ _SHORTEST, _LONGEST = 1e-18, 1e18  # scene units; beyond them phases overflow or
 _QUANTITY = re.compile(r"\s*(?P<number>[-+]?(?:\d[\d_]*\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)?\s*(?P<unit>[^\W\d_]+)?\s*")
 
 
-def parse_wavelengths(wavelength: Wavelength, scene_unit: str | None = None) -> tuple[float, ...]:
+def parse_wavelengths(wavelength: Wavelength | None, scene_unit: str | None = None) -> tuple[float, ...]:
     """Wavelengths in scene units.
 
     Args:
@@ -37,6 +37,8 @@ def parse_wavelengths(wavelength: Wavelength, scene_unit: str | None = None) -> 
         InputError: naming `wavelength` or `scene_unit`: no positive finite number, one outside 1e-18 to 1e18
             scene units, an unknown unit, a unit that is no length, a unit without `scene_unit`, or none at all.
     """
+    if wavelength is None:
+        raise InputError("wavelength: there is none; give one, such as wavelength=0.5 in scene units or '532 nm'")
     scale = None if scene_unit is None else _scene_unit(scene_unit)
     if isinstance(wavelength, str):
         items: Iterable[Any] = wavelength.split(",")

@@ -19,7 +19,7 @@ def field(
     scene: Any,
     points: ArrayLike,
     *,
-    wavelength: Any,
+    wavelength: Any = None,
     scene_unit: str | None = None,
     diffraction: str = "boundary",
     interference: bool = True,
@@ -34,6 +34,7 @@ def field(
         scene: path, dict, `mi.Scene`, name of a built-in scene, or what `grimaldi.load` returned.
         points: (n, 3) float64, in scene units. A point on a surface is taken on the side that the source is on.
         wavelength: one or several, > 0; numbers in scene units, or text with units ("532 nm", "450 nm, 550 nm").
+            That of the scene's own `wave` integrator, if it has one, unless given.
         scene_unit: length of one scene unit, such as "1 um"; needed where the wavelength has a unit.
         diffraction: "boundary" (THEORY eq. 4-6) or "none" (shadow rays).
         interference: whether sources of one coherence group add their fields; if not, each is its own group.
@@ -65,7 +66,7 @@ def field(
     options = checked_options(tolerance, precision, occlusion)
     factor = model(diffraction)
     loaded = load(scene, scene_unit=scene_unit)
-    wavelengths = parse_wavelengths(wavelength, loaded.unit)
+    wavelengths = parse_wavelengths(loaded.wavelength if wavelength is None else wavelength, loaded.unit)
     require_sources(loaded)
     sources = loaded.sources if interference else separated(loaded.sources)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 
 from grimaldi.cli.messages import fail, one_line_each
-from grimaldi.engine.interrupt import listen
+from grimaldi.engine.interrupt import asked, listen
 from grimaldi.errors import InputError
 
 INTERRUPTED = 130
@@ -39,3 +39,7 @@ def _run(arguments: list[str]) -> int:
             return fail("out of memory: ask for fewer points, pixels or samples at once", 1)
     except KeyboardInterrupt:
         return fail("interrupted", INTERRUPTED)
+    except Exception:
+        if asked():  # Dr.Jit wraps what is raised while it records a kernel
+            return fail("interrupted", INTERRUPTED)
+        raise

@@ -1,4 +1,4 @@
-"""Ctrl-C that cannot get lost: an exception raised within a callback from C++ may be swallowed there."""
+"""Ctrl-C that cannot get lost: raised within a callback from C++ it may be swallowed, or come out as another error."""
 
 from __future__ import annotations
 
@@ -11,6 +11,11 @@ _asked = False
 def listen() -> None:
     """From now on Ctrl-C raises KeyboardInterrupt where it falls and, if that was lost, at the next `check`."""
     signal.signal(signal.SIGINT, _interrupt)
+
+
+def asked() -> bool:
+    """Whether Ctrl-C was pressed."""
+    return _asked
 
 
 def check() -> None:

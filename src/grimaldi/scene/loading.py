@@ -95,14 +95,15 @@ def _read(scene: Any, coherent: Collection[str]) -> Scene:
         bodies=shapes.bodies,
         sources=found,
         holes=shapes.holes,
-        unit=unit or _unit_of_wave(mi_scene.integrator()),
+        unit=unit or _of_wave(mi_scene.integrator(), "scene_unit"),
+        wavelength=_of_wave(mi_scene.integrator(), "wavelength"),
     )
 
 
-def _unit_of_wave(integrator: Any) -> str | None:
-    """The `scene_unit` of a scene's own `wave` integrator."""
+def _of_wave(integrator: Any, name: str) -> Any:
+    """A setting of a scene's own `wave` integrator; None of any other."""
     light_of = getattr(integrator, "light_of", None)
-    return None if light_of is None else light_of.settings.scene_unit
+    return None if light_of is None else getattr(light_of.settings, name)
 
 
 def _open(scene: Any) -> tuple[str, Any, str | None]:

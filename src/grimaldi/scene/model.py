@@ -88,6 +88,7 @@ class Scene:
     holes: tuple[PlanarOutline, ...] = ()
     masks: tuple[PlanarOutline, ...] = ()
     unit: str | None = None  # length of one scene unit, as text for pint: "1 um"
+    wavelength: Any = None  # of the scene's own `wave` integrator, as it was written there
 
     @property
     def screen(self) -> tuple[PlanarOutline, ...]:
