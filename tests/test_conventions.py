@@ -55,7 +55,7 @@ def test_wavelengths_in_scene_units(wavelength: Any, scene_unit: str | None, exp
         ([], None, "wavelength: the list is empty"),
         ("", None, "wavelength: ''"),
         ("450 nm,", "1 um", "wavelength: ''"),
-        (None, None, "wavelength: None is neither"),
+        (None, None, "wavelength: there is none; give one"),
         (True, None, "wavelength: True is no length"),
         (1j, None, "wavelength: 1j is neither"),
         ("green", None, "wavelength: 'green' has no number"),
