@@ -16,7 +16,7 @@ from grimaldi.camera import seen
 from grimaldi.coherence import groups, separated
 from grimaldi.conventions import Wavelength, parse_wavelengths
 from grimaldi.diffraction import model
-from grimaldi.diffraction.frame import constant
+from grimaldi.diffraction.frame import toward
 from grimaldi.diffraction.model import Receivers
 from grimaldi.errors import InputError
 from grimaldi.options import checked_options
@@ -147,14 +147,6 @@ class LightOf:
                 warnings.warn(warning.message, stacklevel=2)
             self._key, self._light = key, prepare(loaded, self.settings)
         return self._light
-
-
-def toward(source: Source, p: Any) -> Any:
-    """Unit vectors from points to a source."""
-    if source.position is not None:
-        return dr.normalize(constant(mi.Point3f, source.position) - p)
-    assert source.direction is not None
-    return constant(mi.Vector3f, -source.direction)
 
 
 def _tint(source: Source) -> Any:

@@ -9,7 +9,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from grimaldi.errors import InputError
+from grimaldi.variants import check_variant
 
 
 class Types(NamedTuple):
@@ -28,8 +28,7 @@ class Types(NamedTuple):
 def types(double: bool) -> Types:
     """Float64 or Float32 arrays of the variant in use."""
     variant = mi.variant() or ""
-    if variant.startswith("scalar"):
-        raise InputError(f"variant {variant}: waves need an llvm or cuda variant; use llvm_ad_rgb or llvm_ad_mono")
+    check_variant(variant)
     ad = dr.cuda.ad if variant.startswith("cuda") else dr.llvm.ad
     if double:
         return Types(ad.Float64, ad.Array3f64, ad.Array4f64)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import drjit as dr
+import mitsuba as mi
 import numpy as np
 
 from grimaldi.diffraction.arrays import Types, types
@@ -67,3 +68,11 @@ def incident(source: Source, p: Any, k: float) -> tuple[Any, Any, Any]:
     phase = 2 * np.pi * (turns - dr.round(turns)) + source.phase
     sin, cos = dr.sincos(phase)
     return modulus, cos, sin
+
+
+def toward(source: Source, p: Any) -> Any:
+    """Unit vectors (Float32) from points to a source."""
+    if source.position is not None:
+        return dr.normalize(constant(mi.Point3f, source.position) - p)
+    assert source.direction is not None
+    return constant(mi.Vector3f, -source.direction)

@@ -9,7 +9,7 @@ import drjit as dr
 import mitsuba
 import numpy as np
 
-from grimaldi.diffraction.frame import constant
+from grimaldi.diffraction.frame import constant, toward
 from grimaldi.diffraction.table import Piece
 from grimaldi.scene.model import Mesh, Scene, Source, Sphere
 
@@ -36,19 +36,12 @@ class Rays(NamedTuple):
         end = 1 - self.epsilon(origin) / dr.norm(d)
         return ~self.blockers.ray_test(mi.Ray3f(origin, d, end, 0, mi.Color0f()), active)
 
-    def toward(self, p: Any) -> Any:
-        """The unit direction from points to the source."""
-        if self.source.position is not None:
-            return dr.normalize(constant(mi.Point3f, self.source.position) - p)
-        assert self.source.direction is not None
-        return constant(mi.Vector3f, -self.source.direction)
-
     def lit(self, p: Any, active: Any) -> Any:
         """Whether nothing stands between points and the source; in a corner two surfaces meet at p."""
-        origin = p + self.epsilon(p) * self.toward(p)
+        origin = p + self.epsilon(p) * toward(self.source, p)
         if self.source.position is not None:
             return self.clear(origin, constant(mi.Point3f, self.source.position), active)
-        return ~self.blockers.ray_test(mi.Ray3f(origin, self.toward(origin)), active)
+        return ~self.blockers.ray_test(mi.Ray3f(origin, toward(self.source, origin)), active)
 
     @dr.syntax
     def reaches(self, x: Any, piece: Piece, p: Any, active: Any) -> Any:
@@ -112,7 +105,7 @@ def surface_normals(scene: Scene, source: Source) -> Callable[[Any], Any]:
     def normals(p: Any) -> Any:
         """What a short ray from the source's side runs into."""
         x = mi.Point3f(p)
-        w = probe.toward(x)
+        w = toward(source, x)
         reach = 4 * probe.epsilon(x)
         hit = scene.blockers.ray_intersect(mi.Ray3f(x + reach * w, -w, 2 * reach, 0, mi.Color0f()))
         n = dr.mulsign(mi.Vector3f(hit.n), dr.dot(hit.n, w))

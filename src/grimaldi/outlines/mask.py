@@ -9,8 +9,9 @@ import numpy as np
 
 from grimaldi.outlines.model import Reals
 from grimaldi.outlines.projection import Projection, projection
+from grimaldi.outlines.sphere import across, tangent_circle
 from grimaldi.scene.bodies import is_flat, plane, vertices
-from grimaldi.scene.model import Body, Disk, Mesh, Scene, Source, Sphere
+from grimaldi.scene.model import Body, Disk, Mesh, Scene, Source
 
 if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry
@@ -109,25 +110,8 @@ def _triangles(body: Body, source: Source) -> Reals:
     if isinstance(geometry, Disk):
         loop = _circle() @ geometry.to_world[:3, :2].T + geometry.to_world[:3, 3]
         return _fan(geometry.to_world[:3, 3], loop)
-    return _fan(*_tangent_circle(geometry, source))
-
-
-def _tangent_circle(sphere: Sphere, source: Source) -> tuple[Reals, Reals]:
-    """Centre (3,) and points (n, 3) of the circle where the source's rays touch a sphere."""
-    if source.position is not None:
-        axis = sphere.centre - source.position
-        distance = float(np.linalg.norm(axis))
-        axis = axis / distance
-        ratio = min(sphere.radius / distance, 1.0)
-        centre = sphere.centre - sphere.radius * ratio * axis
-        radius = sphere.radius * float(np.sqrt(1 - ratio**2))
-    else:
-        assert source.direction is not None
-        axis, centre, radius = source.direction, sphere.centre, sphere.radius
-    aside: Reals = np.eye(3)[np.abs(axis).argmin()]
-    first = np.cross(axis, aside)
-    first /= np.linalg.norm(first)
-    return centre, centre + radius * _circle() @ np.stack([first, np.cross(axis, first)])
+    centre, radius, axis = tangent_circle(geometry, source)
+    return _fan(centre, centre + radius * _circle() @ np.stack(across(axis)))
 
 
 def _circle() -> Reals:

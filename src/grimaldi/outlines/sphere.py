@@ -27,7 +27,7 @@ def tangent_circle(sphere: Sphere, source: Source) -> tuple[Reals, float, Reals]
         return sphere.centre, sphere.radius, source.direction
     d = sphere.centre - source.position
     distance = float(np.linalg.norm(d))
-    sine = sphere.radius / distance
+    sine = min(sphere.radius / distance, 1.0)  # from inside, as in a room, nothing is touched
     return (
         sphere.centre - d * sine**2,
         sphere.radius * float(np.sqrt(1 - sine**2)),
