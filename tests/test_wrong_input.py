@@ -351,9 +351,15 @@ def test_what_is_no_scene(scene, says):
         ({"diffraction": "rainbow"}, "diffraction: 'rainbow' is no model; known are boundary, none"),
         ({"precision": "duoble"}, "precision: 'duoble' is unknown; did you mean 'double'?"),
         ({"tolerence": 1e-3}, "tolerence: no such option; did you mean 'tolerance'?"),
+        ({"weights": "lenght"}, "weights: 'lenght' is unknown; did you mean 'length'?"),
+        ({"n": 0}, "n: 0 is no number of sources; give an integer from 1 to 16777216, or 'nyquist'"),
+        ({"n": 2.5}, "n: 2.5 is no number of sources; give an integer from 1 to 16777216, or 'nyquist'"),
+        ({"n": "many"}, "n: 'many' is no number of sources; give an integer from 1 to 16777216, or 'nyquist'"),
+        ({"epsilon": -1}, "epsilon: -1 is no length; give a positive number of scene units"),
+        ({"epsilon": float("nan")}, "epsilon: nan is no length; give a positive number of scene units"),
     ],
 )
-def test_misspelt_names_suggest_the_nearest(options, says):
+def test_wrong_options_are_refused(options, says):
     with pytest.raises(InputError) as error:
         grimaldi.field("young", [[0.0, 0.0, 1.0]], wavelength=0.5, **options)
     assert str(error.value) == says

@@ -17,7 +17,7 @@ from grimaldi.coherence import groups, separated
 from grimaldi.conventions import Wavelength, parse_wavelengths
 from grimaldi.diffraction import model
 from grimaldi.diffraction.frame import toward
-from grimaldi.diffraction.model import Receivers
+from grimaldi.diffraction.model import Options, Receivers
 from grimaldi.errors import InputError
 from grimaldi.options import checked_options
 from grimaldi.propagate import Wave, propagate
@@ -36,12 +36,19 @@ class Settings:
     tolerance: float = 1e-3
     precision: str = "auto"
     occlusion: bool = True
+    n: int | str | None = None
+    weights: str = "report"
+    epsilon: float | None = None
     coherent: tuple[str, ...] = ()
 
     def check(self) -> None:
         """Raise InputError for what is wrong whatever the scene."""
         model(self.diffraction)
-        checked_options(self.tolerance, self.precision)
+        self.options()
+
+    def options(self) -> Options:
+        """The options of the model."""
+        return checked_options(self.tolerance, self.precision, self.occlusion, self.n, self.weights, self.epsilon)
 
 
 class Beam(NamedTuple):
@@ -107,7 +114,7 @@ def prepare(scene: Scene, settings: Settings) -> Light:
     if settings.wavelength is None:
         raise InputError(f"{scene.name}: no wavelength; give one, such as wavelength=0.5 in scene units")
     wavelengths = parse_wavelengths(settings.wavelength, settings.scene_unit or scene.unit)
-    options = checked_options(settings.tolerance, settings.precision, settings.occlusion)
+    options = settings.options()
     factor = model(settings.diffraction)
     where = np.concatenate([seen(scene, sensor).points for sensor in scene.mitsuba.sensors()])
     sources = scene.sources if settings.interference else separated(scene.sources)

@@ -13,10 +13,19 @@ if TYPE_CHECKING:
     from grimaldi.diffraction.model import Options
     from grimaldi.scene.model import Scene
 
+MOST = 1 << 24  # sources an edge, or samples a point
 
-def checked_options(tolerance: Any, precision: Any, occlusion: Any = True) -> Options:
+
+def checked_options(
+    tolerance: Any,
+    precision: Any,
+    occlusion: Any = True,
+    n: Any = None,
+    weights: Any = "report",
+    epsilon: Any = None,
+) -> Options:
     """The options of every model; InputError names the one that is wrong."""
-    from grimaldi.diffraction.model import Options, Precision
+    from grimaldi.diffraction.model import NYQUIST, Options, Precision, Weights
 
     try:
         tolerance = float(tolerance)
@@ -26,7 +35,20 @@ def checked_options(tolerance: Any, precision: Any, occlusion: Any = True) -> Op
         raise InputError(f"tolerance: {tolerance:g} is out of reach; give a number from 1e-12 to 1")
     if precision not in get_args(Precision):
         raise InputError(f"precision: {precision!r} is unknown; {did_you_mean(precision, get_args(Precision))}")
-    return Options(tolerance, precision, bool(occlusion))
+    if weights not in get_args(Weights):
+        raise InputError(f"weights: {weights!r} is unknown; {did_you_mean(weights, get_args(Weights))}")
+    if n is not None and n != NYQUIST and (not isinstance(n, int) or isinstance(n, bool) or not 1 <= n <= MOST):
+        raise InputError(f"n: {n!r} is no number of sources; give an integer from 1 to {MOST}, or {NYQUIST!r}")
+    return Options(tolerance, precision, bool(occlusion), n, weights, _positive("epsilon", epsilon))
+
+
+def _positive(name: str, value: Any) -> float | None:
+    """A positive finite number, or None where there is none."""
+    if value is None:
+        return None
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not 0 < value < math.inf:
+        raise InputError(f"{name}: {value!r} is no length; give a positive number of scene units")
+    return float(value)
 
 
 def describe(scene: Scene, *, diffraction: str, interference: bool, options: Options) -> dict[str, Any]:
@@ -41,6 +63,9 @@ def describe(scene: Scene, *, diffraction: str, interference: bool, options: Opt
         "tolerance": options.tolerance,
         "precision": options.precision,
         "occlusion": str(options.occlusion).lower(),
+        "n": "" if options.n is None else options.n,
+        "weights": options.weights,
+        "epsilon": "" if options.epsilon is None else options.epsilon,
         "grimaldi": version("grimaldi"),
         "mitsuba": version("mitsuba"),
     }

@@ -26,6 +26,9 @@ def field(
     tolerance: float = 1e-3,
     precision: Literal["auto", "double"] = "auto",
     occlusion: bool = True,
+    n: int | Literal["nyquist"] | None = None,
+    weights: Literal["report", "length", "kernel"] = "report",
+    epsilon: float | None = None,
     **unknown: Any,
 ) -> xr.Dataset:
     """The complex field of a scene's sources at points.
@@ -36,12 +39,19 @@ def field(
         wavelength: one or several, > 0; numbers in scene units, or text with units ("532 nm", "450 nm, 550 nm").
             That of the scene's own `wave` integrator, if it has one, unless given.
         scene_unit: length of one scene unit, such as "1 um"; needed where the wavelength has a unit.
-        diffraction: "boundary" (THEORY eq. 4-6) or "none" (shadow rays).
+        diffraction: "boundary" (THEORY eq. 4-6), "huygens" (sources along silhouettes, THEORY 4), "area" (brute-force
+            sum over the open area), or "none" (shadow rays).
         interference: whether sources of one coherence group add their fields; if not, each is its own group.
         tolerance: |M_computed - M| allowed for each source and point, where U = U0 M: the error of integrating the
             stated model, not of the model.
         precision: "auto" (Float32 sums where the tolerance allows), or "double".
         occlusion: whether bodies block the way from an outline to a point.
+        n: sources an edge of "huygens" (3 unless given; "nyquist": at most λ/2 apart); random samples a point of
+            "area", which unless given integrates by quadrature.
+        weights: of the sources of "huygens": "report" (equal strength), "length" or "kernel" (which converges to
+            "boundary" as n grows).
+        epsilon: how far beside an edge the silhouette test of "report" looks [scene units]; 1e-3 of the body's size
+            unless given.
 
     Returns:
         Dataset with `U` complex128 (wavelength, group, point) by eq. 1-2 and 4-6, `intensity` float64 (point) by
@@ -63,7 +73,7 @@ def field(
 
     check_options(unknown, signature(field).parameters)
     p = checked_points(points)
-    options = checked_options(tolerance, precision, occlusion)
+    options = checked_options(tolerance, precision, occlusion, n, weights, epsilon)
     factor = model(diffraction)
     loaded = load(scene, scene_unit=scene_unit)
     wavelengths = parse_wavelengths(loaded.wavelength if wavelength is None else wavelength, loaded.unit)

@@ -13,7 +13,7 @@ import numpy as np
 
 from grimaldi.conventions import check_options
 from grimaldi.errors import GrimaldiWarning, InputError
-from grimaldi.options import checked_options, describe
+from grimaldi.options import describe
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -36,6 +36,9 @@ def render(
     tolerance: float | None = None,
     precision: Literal["auto", "double"] | None = None,
     occlusion: bool | None = None,
+    n: int | Literal["nyquist"] | None = None,
+    weights: Literal["report", "length", "kernel"] | None = None,
+    epsilon: float | None = None,
     max_depth: int | None = None,
     **unknown: Any,
 ) -> xr.Dataset:
@@ -47,7 +50,8 @@ def render(
 
     Args:
         scene: path, dict, `mi.Scene`, name of a built-in scene, or what `grimaldi.load` returned.
-        wavelength, scene_unit, diffraction, interference, tolerance, precision, occlusion: as in `grimaldi.field`.
+        wavelength, scene_unit, diffraction, interference, tolerance, precision, occlusion, n, weights, epsilon: as in
+            `grimaldi.field`.
         spp: samples a pixel.
         seed: of the random numbers.
         size: (width, height) in pixels.
@@ -86,6 +90,9 @@ def render(
         "tolerance": tolerance,
         "precision": precision,
         "occlusion": occlusion,
+        "n": n,
+        "weights": weights,
+        "epsilon": epsilon,
     }
     settings = replace(_settings(own), **{name: value for name, value in asked.items() if value is not None})
     settings.check()
@@ -201,7 +208,7 @@ def _dataset(scene: Scene, light: Light, settings: Settings, shot: Shot, done: l
         scene,
         diffraction=settings.diffraction,
         interference=settings.interference,
-        options=checked_options(settings.tolerance, settings.precision, settings.occlusion),
+        options=settings.options(),
     )
     attrs |= {"wavelength": list(wavelengths), "spp": shot.spp, "seed": shot.seed, "non_finite": lost}
     return xr.Dataset(data, coords, attrs)

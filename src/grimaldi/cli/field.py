@@ -29,6 +29,9 @@ def field(
     interference: options.Interference = None,
     tolerance: options.Tolerance = None,
     precision: options.Precision = None,
+    n: options.N = None,
+    weights: options.Weights = None,
+    epsilon: options.Epsilon = None,
     variant: options.Variant = None,
 ) -> None:
     """Compute the complex field of SCENE at points."""
@@ -46,6 +49,9 @@ def field(
         interference=interference,
         tolerance=tolerance,
         precision=precision,
+        n=options.number(n),
+        weights=weights,
+        epsilon=epsilon,
     )
     options.set_variant(variant)
 

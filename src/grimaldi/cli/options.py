@@ -35,6 +35,18 @@ Interference = Annotated[
 ]
 Tolerance = Annotated[float | None, typer.Option(help="Largest error of M for each source and point.  [default: 1e-3]")]
 Precision = Annotated[Literal["auto", "double"] | None, typer.Option(help="Of the edge integrals.")]
+N = Annotated[
+    str | None,
+    typer.Option(
+        "--n", help="Sources an edge (or 'nyquist') of the model huygens, samples a point of area.", metavar="NUMBER"
+    ),
+]
+Weights = Annotated[
+    Literal["report", "length", "kernel"] | None, typer.Option(help="Of huygens' sources.  [default: report]")
+]
+Epsilon = Annotated[
+    float | None, typer.Option(help="Of the report's silhouette test, in scene units.", metavar="LENGTH")
+]
 Variant = Annotated[
     str | None, typer.Option(help="Mitsuba's variant, such as llvm_ad_rgb.  [default: the best that works]")
 ]
@@ -43,6 +55,11 @@ Variant = Annotated[
 def given(**options: Any) -> dict[str, Any]:
     """The options that were given: the library's own defaults serve for the rest."""
     return {name: value for name, value in options.items() if value is not None}
+
+
+def number(text: str | None) -> int | str | None:
+    """A whole number where it is one; the library says what else may stand there."""
+    return int(text) if text is not None and text.removeprefix("-").isdecimal() else text
 
 
 def check_output(path: Path, suffixes: tuple[str, ...]) -> None:

@@ -10,6 +10,8 @@ from grimaldi.outlines.model import Outline
 from grimaldi.scene.model import Scene, Source
 
 Precision = Literal["auto", "double"]
+Weights = Literal["report", "length", "kernel"]
+NYQUIST: Literal["nyquist"] = "nyquist"
 
 
 @dataclass(frozen=True)
@@ -18,11 +20,18 @@ class Options:
 
     tolerance: |M_computed - M| allowed for each source and point; precision: "auto" or "double";
     occlusion: whether bodies block the way from an outline to a point.
+
+    Of the models that sum over sources: n is how many an edge (`huygens`; "nyquist": λ/2 apart) or a point
+    (`area`) gets, None for the model's own choice; `huygens` has `weights`, and the distance epsilon [scene units]
+    of the report's silhouette test, None for its own choice.
     """
 
     tolerance: float = 1e-3
     precision: Precision = "auto"
     occlusion: bool = True
+    n: int | Literal["nyquist"] | None = None
+    weights: Weights = "report"
+    epsilon: float | None = None
 
 
 class Receivers(NamedTuple):

@@ -48,6 +48,20 @@ def register(V: Any) -> None:
            - |bool|
            - Whether bodies block the way from an outline to a surface. (Default: true)
 
+         * - n
+           - |int| or |string|
+           - Of the models "huygens" and "area": sources an edge ("nyquist": half a wavelength apart), or samples a
+             point. (Default: 3 an edge; quadrature)
+
+         * - weights
+           - |string|
+           - Of the model "huygens": "report", "length" or "kernel". (Default: "report")
+
+         * - epsilon
+           - |float|
+           - Of the model "huygens" with the weights "report": how far beside an edge its silhouette test looks, in
+             scene units. (Default: 1e-3 of the body's size)
+
          * - max_depth
            - |int|
            - Longest path from the camera; 2 is direct light, -1 no limit. (Default: 2)
@@ -95,6 +109,9 @@ def register(V: Any) -> None:
                 tolerance=parameters.number(props, "tolerance", 1e-3),
                 precision=str(props.get("precision", "auto")),
                 occlusion=bool(props.get("occlusion", True)),
+                n=props.get("n", None),
+                weights=str(props.get("weights", "report")),
+                epsilon=props.get("epsilon", None),
                 coherent=parameters.names(props, "coherent"),
             )
             settings.check()
