@@ -50,7 +50,7 @@ def field(
             "area", which unless given integrates by quadrature.
         weights: of the sources of "huygens": "report" (equal strength), "length" or "kernel" (which converges to
             "boundary" as n grows).
-        epsilon: how far beside an edge the silhouette test of "report" looks [scene units]; 1e-3 of the body's size
+        epsilon: how far beside an edge the silhouette test of "report" looks [scene units]; 2e-4 of the body's size
             unless given.
 
     Returns:

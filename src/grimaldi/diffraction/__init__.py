@@ -8,14 +8,15 @@ from grimaldi.errors import InputError
 
 
 def model(name: str) -> Model:
-    """The model called `name`: "boundary" or "none".
+    """The model called `name`, one of `ModelName`.
 
     Raises InputError for any other name, with the nearest of these.
     """
     from grimaldi.diffraction.boundary import boundary
+    from grimaldi.diffraction.huygens import huygens
     from grimaldi.diffraction.none import none
 
-    models: dict[ModelName, Model] = {"boundary": boundary, "none": none}
+    models: dict[ModelName, Model] = {"boundary": boundary, "huygens": huygens, "none": none}
     if name not in models:
         raise InputError(f"diffraction: {name!r} is no model; {did_you_mean(name, models)}")
     return models[name]

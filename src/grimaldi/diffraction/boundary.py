@@ -19,7 +19,7 @@ from grimaldi.diffraction.model import Evaluate, Factor, Options, Receivers
 from grimaldi.diffraction.occlusion import rays
 from grimaldi.diffraction.screen import beyond
 from grimaldi.diffraction.segment import Rule
-from grimaldi.diffraction.table import Table, table
+from grimaldi.diffraction.table import Table, needs_double, table
 from grimaldi.outlines.model import Outline
 from grimaldi.scene.model import Scene, Source
 
@@ -33,20 +33,11 @@ def boundary(scene: Scene, source: Source, outline: Outline, k: float, options: 
     """
     if len(outline) == 0:
         return none.none(scene, source, outline, k, options)
-    double = _needs_double(outline, k, options)
-    tab = table(outline, types(double))
+    tab = table(outline, types(needs_double(outline, k, options)))
     rule = Rule.of(options.tolerance)
     if scene.screen:
         return _planar(scene, source, tab, k, rule)
     return _bodies(scene, source, tab, outline.sag, k, rule, options)
-
-
-def _needs_double(outline: Outline, k: float, options: Options) -> bool:
-    """Float32 rounding grows as √(kΔ): enough at 1e-4 up to outlines of 1e6 radians."""
-    if options.precision == "double" or options.tolerance < 1e-4:
-        return True
-    ends = np.concatenate([outline.start, outline.end])
-    return k * float(np.ptp(ends, axis=0).max()) > 1e6
 
 
 def _factor(tab: Table, rule: Rule, geometric: Any, sign: int, sums: Sum) -> Factor:

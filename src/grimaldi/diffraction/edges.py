@@ -93,7 +93,7 @@ def planar_count(fr: Frame, tab: Table, active: Any) -> Any:
 # ---------------------------------------------------------------- bodies
 
 
-def _acts(fr: Frame, piece: Piece, n: Any) -> Any:
+def sounds(fr: Frame, piece: Piece, n: Any) -> Any:
     """Whether an outline piece can send a wave to a receiver at all (THEORY 2).
 
     A receiver on a surface, normal n, hears only what rises above its horizon: so a body's own outline does not
@@ -121,7 +121,7 @@ def _matters(fr: Frame, piece: Piece, e: Any, k: float, share: float) -> Any:
     return dr.sqrt(D) > 4 * np.pi * share * (D + w) * dr.sqrt(w)
 
 
-def _closest(fr: Frame, seg: Segment, ln: Line) -> Any:
+def closest(fr: Frame, seg: Segment, ln: Line) -> Any:
     """Squared distance of the ray S→P to a segment, infinite outside of S..P."""
     t = dr.clip(ln.td, 0, seg.length)
     along = ln.h + t * ln.ea
@@ -148,7 +148,7 @@ def body_sum(
     i = U(0)
     while receivers.active & (i < tab.n_pieces):
         piece = tab.piece(i)
-        acts = _acts(fr, piece, n)
+        acts = sounds(fr, piece, n)
         if dr.hint(probe is not None, mode="scalar"):
             assert probe is not None
             tested = acts & _matters(fr, piece, tab.segment(piece.first).e, k, share)
@@ -160,7 +160,7 @@ def body_sum(
             seg = tab.segment(j)
             re, im, er, ei, _ = segment_wave(fr, seg.X0, seg.e, seg.length, k, rule, acts)
             real, imag, err_real, err_imag = real + re, imag + im, err_real + er, err_imag + ei
-            d2 = _closest(fr, seg, line(fr, seg.X0, seg.e))
+            d2 = closest(fr, seg, line(fr, seg.X0, seg.e))
             closer = d2 < nearest2
             nearest2 = dr.select(closer, d2, nearest2)
             nearest_segment = dr.select(closer, j, nearest_segment)
@@ -183,7 +183,7 @@ def _crossings(fr: Frame, tab: Table, bend: Any, n: Any, active: Any) -> Any:
     count, i = F(0), U(0)
     while active & (i < tab.n_pieces):
         piece = tab.piece(i)
-        acts = _acts(fr, piece, n)
+        acts = sounds(fr, piece, n)
         j = U(piece.first)
         while acts & (j < piece.end):
             seg = tab.segment(j)

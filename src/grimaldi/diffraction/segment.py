@@ -112,7 +112,7 @@ def end_wave(frame: Frame, ln: Line, t: Any, k: float) -> tuple[Any, Any, Any, A
     rho = (0.5 * dcos / dr.maximum(C, 1e-12) - 2 * b / d2 - dd / slope) / (slope * k)
     pole = 1 / (k * delta)
     rho2 = rho * rho + 2 * dr.square(rho + pole) + pole * pole
-    sin, cos_ = _sincos(k * delta)
+    sin, cos_ = sincos(k * delta)
     real, imag = g * rho, g * (rho2 - 1)
     last = 5 * g * rho * rho2  # |g₃/g₀| is 4 to 5 ρ ρ₂ between the two limits
     return (
@@ -161,7 +161,7 @@ def stationary(frame: Frame, ln: Line, eq_q0: tuple[Any, Any]) -> Stationary:
     return Stationary(t2 + (t1 - t2) * share, path * share * (1 - share) / sin2)
 
 
-def _sincos(x: Any) -> tuple[Any, Any]:
+def sincos(x: Any) -> tuple[Any, Any]:
     """Sine and cosine with the argument reduced first: Dr.Jit's own run away beyond 1e6 or so."""
     return dr.sincos(x - 2 * np.pi * dr.round(x * (0.5 / np.pi)))
 
@@ -193,7 +193,7 @@ def _direct(frame: Frame, ln: Line, st: Stationary, lo: Any, hi: Any, k: float, 
             inv = dr.rcp(ev)
             cosh = 0.5 * (ev + inv)
             delta, C, _, _ = detour(frame, ln, ln.td + 0.5 * ln.w * (ev - inv), ln.eqq * dr.square(ln.w * cosh))
-            sin, cos = _sincos(k * delta)
+            sin, cos = sincos(k * delta)
             amplitude = w_j * dv * C / cosh
             real = dr.fma(amplitude, cos, real)
             imag = dr.fma(amplitude, sin, imag)

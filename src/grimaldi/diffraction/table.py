@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from grimaldi.diffraction.arrays import Types
+from grimaldi.diffraction.model import Options
 from grimaldi.outlines.model import Outline
 from grimaldi.scene.model import Vector
 
@@ -89,12 +90,20 @@ def cut(outline: Outline) -> NDArray[np.int64]:
     return np.array([*first, len(lengths)], np.int64)
 
 
-def table(outline: Outline, types: Types) -> Table:
-    """Pack an outline."""
+def needs_double(outline: Outline, k: float, options: Options) -> bool:
+    """Float32 rounding grows as √(kΔ): enough at 1e-4 up to outlines of 1e6 radians."""
+    if options.precision == "double" or options.tolerance < 1e-4:
+        return True
+    ends = np.concatenate([outline.start, outline.end])
+    return k * float(np.ptp(ends, axis=0).max()) > 1e6
+
+
+def table(outline: Outline, types: Types, ranges: NDArray[np.int64] | None = None) -> Table:
+    """Pack an outline; its pieces begin at the segments `ranges`, the last of which is their number (`cut`)."""
     ends = np.concatenate([outline.start, outline.end])
     low, high = ends.min(0), ends.max(0)
     centre = 0.5 * (low + high)
-    ranges = cut(outline)
+    ranges = cut(outline) if ranges is None else ranges
     X0, X1 = outline.start - centre, outline.end - centre
     length = np.linalg.norm(X1 - X0, axis=1, keepdims=True)
     zero = np.zeros_like(length)

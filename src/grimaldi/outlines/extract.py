@@ -43,7 +43,7 @@ def outline(scene: Scene, source: Source, *, sag: Sequence[float] | None = None)
     standing = obstacles(scene.bodies, source)
     lit = lit_parts(standing, source, edges, body, LONGEST * extents[body])
     coarsest = max((s for b, s in zip(scene.bodies, sag, strict=True) if not isinstance(b.geometry, Mesh)), default=0.0)
-    return _assemble(edges, body, lit, _behind(standing, source, edges, body, lit), source, coarsest)
+    return assemble(edges, body, lit, gap_behind(standing, source, edges, body, lit), source, coarsest)
 
 
 def curve(shape: Geometry | PlanarOutline) -> tuple[Reals, float]:
@@ -65,7 +65,9 @@ def _silhouette(body: Body, source: Source, sag: float) -> Candidates:
     return disk.silhouette(geometry, source, sag)
 
 
-def _behind(standing: tuple[Obstacle, ...], source: Source, edges: Candidates, body: Integers, lit: Stretches) -> Reals:
+def gap_behind(
+    standing: tuple[Obstacle, ...], source: Source, edges: Candidates, body: Integers, lit: Stretches
+) -> Reals:
     """For each lit stretch, how far behind its middle its own body comes next."""
     c, at = lit.candidate, 0.5 * (lit.low + lit.high)
     x = edges.start[c] + at[:, None] * (edges.end[c] - edges.start[c])
@@ -84,10 +86,10 @@ def _planar(scene: Scene, source: Source, sag: Sequence[float]) -> Outline:
             number.append(np.full(len(loop.start), -1 - i))
     edges = Candidates.concatenate(parts)
     n = len(edges.start)
-    return _assemble(edges, np.concatenate(number), Stretches.whole(n), np.full(n, np.inf), source, max(sag))
+    return assemble(edges, np.concatenate(number), Stretches.whole(n), np.full(n, np.inf), source, max(sag))
 
 
-def _assemble(edges: Candidates, body: Integers, lit: Stretches, behind: Reals, source: Source, sag: float) -> Outline:
+def assemble(edges: Candidates, body: Integers, lit: Stretches, behind: Reals, source: Source, sag: float) -> Outline:
     """The lit stretches in the order of their chains."""
     c = lit.candidate
     span = edges.end[c] - edges.start[c]

@@ -8,6 +8,7 @@ matters. Each triangle's side is decided once, by one determinant: the edges of 
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from grimaldi.outlines.candidate import Candidates, facing
 from grimaldi.outlines.model import Integers, Reals
@@ -20,6 +21,11 @@ def weld(mesh: Mesh) -> tuple[Reals, Integers]:
     keys = points.view(np.dtype((np.void, points.itemsize * 3))).ravel()
     _, first, inverse = np.unique(keys, return_index=True, return_inverse=True)
     return points[first], inverse[mesh.faces]
+
+
+def has_corners(faces: Integers) -> NDArray[np.bool_]:
+    """Whether faces (m, 3) join three different vertices."""
+    return (faces != np.roll(faces, 1, axis=1)).all(axis=1)
 
 
 def sides(source: Source, corners: Reals) -> Integers:
@@ -40,7 +46,7 @@ def silhouette(mesh: Mesh, source: Source) -> Candidates:
     behind and its normal points away, so that the body is behind both. A border has one normal.
     """
     points, faces = weld(mesh)
-    whole = (faces != np.roll(faces, 1, axis=1)).all(axis=1)
+    whole = has_corners(faces)
     index, faces = np.flatnonzero(whole), faces[whole]
     side = sides(source, points[faces])
 
@@ -60,13 +66,13 @@ def silhouette(mesh: Mesh, source: Source) -> Candidates:
     two = count[bounds] == 2
     face1 = corner // 3
     face2 = np.where(two, order[np.minimum(first[bounds] + 1, len(order) - 1)] // 3, -1)
-    normals, swap = _normals(points, faces, source, start, face1, face2)
+    normals, swap = normals_beside(points, faces, source, start, face1, face2)
     face1, face2 = np.where(swap, face2, face1), np.where(swap, face1, face2)
     beside = np.stack([index[face1], np.where(two, index[face2], -1)], axis=1)
     return Candidates(start, end, normals, bounds, beside)
 
 
-def _normals(
+def normals_beside(
     points: Reals, faces: Integers, source: Source, x: Reals, face1: Integers, face2: Integers
 ) -> tuple[Reals, np.ndarray]:
     """Normals (n, 2, 3) beside edges at x, the face towards the source first, and where face2 is that one."""

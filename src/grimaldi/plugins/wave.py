@@ -60,7 +60,7 @@ def register(V: Any) -> None:
          * - epsilon
            - |float|
            - Of the model "huygens" with the weights "report": how far beside an edge its silhouette test looks, in
-             scene units. (Default: 1e-3 of the body's size)
+             scene units. (Default: 2e-4 of the body's size)
 
          * - max_depth
            - |int|

@@ -1,0 +1,113 @@
+"""Silhouettes as the report found them: two rays past every edge, ε beside it (THEORY 4, weights "report").
+
+Kept for comparison: an edge counts or not as a whole, and which do changes with ε. `extract` is exact.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import mitsuba
+import numpy as np
+from numpy.typing import NDArray
+
+from grimaldi.outlines import disk
+from grimaldi.outlines.candidate import Candidates, closed_curve, polygon, toward
+from grimaldi.outlines.extract import assemble, curve, gap_behind
+from grimaldi.outlines.hidden import Queries, hidden, obstacles
+from grimaldi.outlines.lit import Stretches
+from grimaldi.outlines.mesh import has_corners, normals_beside, weld
+from grimaldi.outlines.model import Outline, Reals
+from grimaldi.outlines.sphere import across
+from grimaldi.scene.model import Mesh, Scene, Source, Sphere
+
+mi: Any = mitsuba  # the stubs refuse numbers where arrays are asked for
+
+EPSILON = 2e-4  # of a body's size, where none is given
+CIRCLE = 32  # edges of a circle, as much as a mesh's
+DEEP = 0.02  # of a body's size: how far beyond an edge a ray has to be free, so that grazing faces do not count
+
+
+def offset_outline(scene: Scene, source: Source, epsilon: float | None = None) -> Outline:
+    """The silhouette edges of a scene's bodies by the report's test.
+
+    epsilon: how far beside an edge the rays pass [scene units]; 2e-4 of each body's size unless given. Of a mesh
+    the edges of whose two rays one passes and the other does not; of a sphere the great circle across the light,
+    of a disk the rim, both as 32 edges, where the source reaches their middles.
+    """
+    standing = obstacles(scene.bodies, source)
+    parts: list[Candidates] = []
+    for number, body in enumerate(scene.bodies):
+        geometry = body.geometry
+        if isinstance(geometry, Mesh):
+            parts.append(_mesh(scene, geometry, source, epsilon or EPSILON * curve(geometry)[1]))
+            continue
+        edges = _great_circle(geometry, source) if isinstance(geometry, Sphere) else _rim(geometry, source)
+        own = np.full(len(edges.start), number)
+        parts.append(_taken(edges, ~hidden(standing, source, Queries(_middle(edges), own, edges.faces))))
+    if not any(len(part.start) for part in parts):
+        return Outline.empty()
+    edges = Candidates.concatenate(parts)
+    body = np.repeat(np.arange(len(parts)), [len(part.start) for part in parts])
+    whole = Stretches.whole(len(body))
+    return assemble(edges, body, whole, gap_behind(standing, source, edges, body, whole), source, 0.0)
+
+
+def _middle(edges: Candidates) -> Reals:
+    return 0.5 * (edges.start + edges.end)
+
+
+def _taken(edges: Candidates, which: NDArray[np.bool_]) -> Candidates:
+    return Candidates(edges.start[which], edges.end[which], edges.normals[which], edges.edge[which], edges.faces[which])
+
+
+def _great_circle(sphere: Sphere, source: Source) -> Candidates:
+    light = -toward(source, sphere.centre[None])[0]
+    x, y = across(light / np.linalg.norm(light))
+    corners = sphere.centre + sphere.radius * polygon(CIRCLE) @ np.stack([x, y])
+    radial = 0.5 * (corners + np.roll(corners, -1, axis=0)) - sphere.centre
+    normal = radial / np.linalg.norm(radial, axis=1, keepdims=True)
+    return closed_curve(corners, np.stack([normal, normal], axis=1))
+
+
+def _rim(shape: Any, source: Source) -> Candidates:
+    size = curve(shape)[1]
+    return disk.silhouette(shape, source, size * np.pi**2 / (2 * CIRCLE**2))
+
+
+def _mesh(scene: Scene, mesh: Mesh, source: Source, epsilon: float) -> Candidates:
+    points, faces = weld(mesh)
+    whole = has_corners(faces)
+    index, faces = np.flatnonzero(whole), faces[whole]
+    ends = np.sort(np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
+    order = np.lexsort((ends[:, 1], ends[:, 0]))
+    first = np.flatnonzero(np.append(True, (np.diff(ends[order], axis=0) != 0).any(axis=1)))
+    count = np.diff(np.append(first, len(order)))
+    start, end = np.moveaxis(points[ends[order[first]]], 1, 0)
+    face1 = order[first] // 3
+    face2 = np.where(count > 1, order[np.minimum(first + 1, len(order) - 1)] // 3, -1)
+
+    out = np.cross(end - start, -toward(source, 0.5 * (start + end)))
+    length, deep = np.linalg.norm(out, axis=1, keepdims=True), DEEP * curve(mesh)[1]
+    out = out / np.maximum(length, 1e-300)
+    plus, minus = (_passes(scene, source, 0.5 * (start + end) + side * epsilon * out, deep) for side in (1, -1))
+    found = (plus != minus) & (length[:, 0] > 0)
+    # the body on the left of the edge, seen along the light
+    start, end = np.where(plus[:, None], start, end)[found], np.where(plus[:, None], end, start)[found]
+    face1, face2 = face1[found], face2[found]
+    normals, swap = normals_beside(points, faces, source, start, face1, face2)
+    face1, face2 = np.where(swap, face2, face1), np.where(swap, face1, face2)
+    beside = np.stack([index[face1], np.where(face2 >= 0, index[face2], -1)], axis=1)
+    return Candidates(start, end, normals, np.flatnonzero(found), beside)
+
+
+def _passes(scene: Scene, source: Source, x: Reals, deep: float) -> NDArray[np.bool_]:
+    """Whether the light goes past points x (n, 3) and `deep` further, by Mitsuba's rays."""
+    back = toward(source, x)
+    if source.is_plane:
+        box = scene.blockers.bbox()
+        back = back * 2 * float(np.linalg.norm(np.array(box.max) - np.array(box.min)))
+    reach = np.linalg.norm(back, axis=1)
+    origin, d = (x + back).T, -(back / reach[:, None]).T
+    ray = mi.Ray3f(mi.Point3f(origin), mi.Vector3f(d), mi.Float(reach + deep), 0, mi.Color0f())
+    return ~np.array(scene.blockers.ray_test(ray))
