@@ -348,7 +348,7 @@ def test_what_is_no_scene(scene, says):
     ("options", "says"),
     [
         ({"diffraction": "boundry"}, "diffraction: 'boundry' is no model; did you mean 'boundary'?"),
-        ({"diffraction": "rainbow"}, "diffraction: 'rainbow' is no model; known are boundary, huygens, none"),
+        ({"diffraction": "rainbow"}, "diffraction: 'rainbow' is no model; known are area, boundary, huygens, none"),
         ({"precision": "duoble"}, "precision: 'duoble' is unknown; did you mean 'double'?"),
         ({"tolerence": 1e-3}, "tolerence: no such option; did you mean 'tolerance'?"),
         ({"weights": "lenght"}, "weights: 'lenght' is unknown; did you mean 'length'?"),

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 SIGNS = "exp(-i omega t): U = A exp(i phase) exp(+i k R)/R, so phase grows with the distance from the source"
 
 Wavelength = float | str | Sequence[float | str]
-ModelName = Literal["none", "boundary", "huygens"]
+ModelName = Literal["none", "boundary", "huygens", "area"]
 
 _SHORTEST, _LONGEST = 1e-18, 1e18  # scene units; beyond them phases overflow or divide by zero
 

@@ -58,4 +58,7 @@ def field(
     import grimaldi
 
     dataset = grimaldi.field(scene, where, **chosen)
+    if diffraction == "area" and n is not None:
+        error, size = (float((abs(dataset[name]) ** 2).mean()) ** 0.5 for name in ("error", "U"))
+        print(f"{n} samples a point: standard error {error:.3g} (variance {error**2:.3g}), |U| {size:.3g}, both rms")
     write(dataset.assign_attrs(layout), output)

@@ -12,11 +12,12 @@ def model(name: str) -> Model:
 
     Raises InputError for any other name, with the nearest of these.
     """
+    from grimaldi.diffraction.area import area
     from grimaldi.diffraction.boundary import boundary
     from grimaldi.diffraction.huygens import huygens
     from grimaldi.diffraction.none import none
 
-    models: dict[ModelName, Model] = {"boundary": boundary, "huygens": huygens, "none": none}
+    models: dict[ModelName, Model] = {"area": area, "boundary": boundary, "huygens": huygens, "none": none}
     if name not in models:
         raise InputError(f"diffraction: {name!r} is no model; {did_you_mean(name, models)}")
     return models[name]
