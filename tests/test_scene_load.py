@@ -234,7 +234,7 @@ def test_other_lights_are_named_in_one_warning():
     description = shapes(
         lamp=LAMP,
         sky={"type": "constant"},
-        torch={"type": "spot"},
+        torch={"type": "spot", "texture": {"type": "checkerboard"}},
         panel={"type": "rectangle", "emitter": {"type": "area", "id": "glow"}},
     )
     with pytest.warns(GrimaldiWarning, match="stays ordinary light") as warned:

@@ -170,12 +170,13 @@ def fingerprint(scene: Scene) -> bytes:
         digest.update(np.ascontiguousarray(vertices(body.geometry)).tobytes())
         if isinstance(body.geometry, Mesh):
             digest.update(np.ascontiguousarray(body.geometry.faces).tobytes())
-    for planar in scene.screen:
+    for planar in (*scene.screen, *(s.aperture for s in scene.sources if s.aperture is not None)):
         digest.update(np.concatenate([*planar.loops, planar.to_world[:, :2]], axis=None).tobytes())
     for s in scene.sources:
         digest.update(repr((s.name, s.group, s.amplitude, s.phase, s.tint)).encode())
         for v in (s.position, s.direction, s.origin):
             digest.update(b"-" if v is None else v.tobytes())
+        digest.update(repr(s.spot and (s.spot.axis.tolist(), s.spot.beam_width, s.spot.cutoff)).encode())
     for sensor in scene.mitsuba.sensors():
         digest.update(repr((sensor.world_transform(), sensor.film().crop_size())).encode())
     return digest.digest()

@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
+import drjit as dr
 import numpy as np
 
 from grimaldi.diffraction.frame import incident
 from grimaldi.diffraction.model import Model, Options, Receivers
+from grimaldi.diffraction.screen import beyond
 from grimaldi.outlines.extract import curve, outline
 from grimaldi.outlines.model import Reals
 from grimaldi.scene.model import Scene, Source
@@ -30,11 +32,16 @@ def propagate(
     k: wavenumber [1/scene unit]; where (n, 3): some of the points where the field will be asked. The function is
     pure and can be traced inside a larger kernel.
     """
+    scene = scene.before(source)
     seen = outline(scene, source, sag=_sags(scene, source, options.tolerance / k, where))
     factor = model(scene, source, seen, k, options)
 
+    ahead = None if source.aperture is None else beyond(source.aperture, source)
+
     def wave(receivers: Receivers) -> Wave:
         modulus, cos, sin = incident(source, receivers.p, k)
+        if ahead is not None:
+            modulus = dr.select(ahead(receivers.p), modulus, 0)
         m = factor(receivers)
         F = type(modulus)
         re, im = F(m.real), F(m.imag)

@@ -9,7 +9,7 @@ import mitsuba as mi
 import numpy as np
 
 from grimaldi.diffraction.arrays import Types, types
-from grimaldi.scene.model import Source, Vector
+from grimaldi.scene.model import Source, Spot, Vector
 
 
 class Frame(NamedTuple):
@@ -62,12 +62,21 @@ def incident(source: Source, p: Any, k: float) -> tuple[Any, Any, Any]:
         modulus = type(path)(source.amplitude)
     else:
         assert source.position is not None
-        path = dr.norm(p - constant(V, source.position))
+        d = p - constant(V, source.position)
+        path = dr.norm(d)
         modulus = source.amplitude / path
+        if source.spot is not None:
+            modulus *= dr.sqrt(profile(source.spot, d / path))
     turns = path * (k / (2 * np.pi))
     phase = 2 * np.pi * (turns - dr.round(turns)) + source.phase
     sin, cos = dr.sincos(phase)
     return modulus, cos, sin
+
+
+def profile(spot: Spot, d: Any) -> Any:
+    """The share of a spot's intensity that goes along unit vectors d: Mitsuba's own."""
+    angle = dr.safe_acos(dr.dot(d, constant(type(d), spot.axis)))
+    return dr.clip((spot.cutoff - angle) / max(spot.cutoff - spot.beam_width, 1e-12), 0, 1)
 
 
 def toward(source: Source, p: Any) -> Any:

@@ -26,4 +26,5 @@ def outline(scene: Any, source: Source | str | None = None) -> Outline:
     from grimaldi.scene.sources import pick_source
 
     loaded = load(scene)
-    return extract(loaded, source if isinstance(source, Source) else pick_source(loaded, source))
+    chosen = source if isinstance(source, Source) else pick_source(loaded, source)
+    return extract(loaded.before(chosen), chosen)

@@ -42,6 +42,7 @@ def shadow_mask(scene: Scene, source: Source) -> Mask:
     """
     import shapely
 
+    scene = scene.before(source)
     if scene.screen:
         loops = [loop for outline in scene.screen for loop in outline.world_loops(CORNERS)]
         flat = projection(source, np.concatenate(loops))

@@ -43,7 +43,7 @@ def sort_shapes(shapes: Iterable[Any]) -> Shapes:
     for index, shape in enumerate(shapes):
         name = shape.id() or f"{shape.class_name()} {index}"
         if getattr(shape.bsdf(), "plugin_name", None) == "aperture":
-            holes.append(_hole(shape, name))
+            holes.append(planar_outline(shape, name))
         elif _is_opaque(shape):
             bodies.append(Body(name, index, _geometry(shape)))
         else:
@@ -75,6 +75,14 @@ def _lets_through(shape: Any) -> bool:
 
     bsdf = shape.bsdf()
     return bsdf is not None and bool(bsdf.flags() & int(mi.BSDFFlags.Null))
+
+
+def front(shape: Any) -> Reals:
+    """The unit normal (3,) of a planar shape, on the side that emits."""
+    import mitsuba as mi
+
+    normal = np.array(shape.sample_position(0.0, mi.Point2f(0.5)).n, dtype=np.float64).reshape(3)
+    return normal / np.linalg.norm(normal)
 
 
 def faces_inward(mi_scene: Any, body: Body) -> bool:
@@ -133,7 +141,11 @@ def _to_world(shape: Any) -> Reals:
     return np.array(to_world.matrix, dtype=np.float64).reshape(4, 4)
 
 
-def _hole(shape: Any, name: str) -> PlanarOutline:
+def planar_outline(shape: Any, name: str) -> PlanarOutline:
+    """The outline of a planar shape as a hole.
+
+    Raises InputError for any shape that is no rectangle, disk or planar mesh.
+    """
     if shape.class_name() == "Rectangle":
         return PlanarOutline(_SQUARE, _to_world(shape))
     if shape.class_name() == "Disk":

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, cast
 
@@ -15,7 +16,7 @@ from grimaldi.scene.bodies import faces_inward, vertices
 from grimaldi.scene.messages import where
 from grimaldi.scene.model import Body, Mesh, Scene, Sphere
 from grimaldi.scene.ply import check_ply
-from grimaldi.scene.screen import check_screen
+from grimaldi.scene.screen import check_aperture, check_screen
 from grimaldi.scene.serialized import check_serialized
 from grimaldi.scene.sources import ZERO_DIRECTION
 from grimaldi.scene.triangles import LARGEST, check_positions, check_triangles
@@ -29,8 +30,8 @@ def require_sources(scene: Scene) -> None:
     """Raises InputError where a field is asked of a scene without a source."""
     if not scene.sources:
         raise InputError(
-            f"{scene.name}: has no source of waves; add a 'point', 'directional', 'coherent_point' or "
-            "'coherent_directional' emitter"
+            f"{scene.name}: has no source of waves; add a 'point', 'directional', 'spot', 'coherent_point', "
+            "'coherent_directional' or 'coherent_area' emitter"
         )
 
 
@@ -48,6 +49,7 @@ def check_nodes(state: Any) -> None:
     """
     import mitsuba as mi
 
+    _check_area_lights(state)
     resolver = cast(Any, mi).file_resolver()  # misplaced in the stubs
     for node in state.nodes:
         plugin, props = node.props.plugin_name(), node.props
@@ -73,6 +75,22 @@ def check_nodes(state: Any) -> None:
             raise InputError(f"{place}: directional: {ZERO_DIRECTION}")  # Mitsuba makes NaN of it
 
 
+def _check_area_lights(state: Any) -> None:
+    """Mitsuba says nothing of emitters that want a shape and stand in the scene itself."""
+    import mitsuba as mi
+
+    props = state.root.props
+    for name in props:
+        if props.type(name) != mi.Properties.Type.ResolvedReference:
+            continue
+        node = state.nodes[props[name].index()]
+        if node.props.plugin_name() == "coherent_area":
+            raise InputError(
+                f"{where(mi.parser.file_location(state, node))}: a coherent_area is part of a shape; put it into a "
+                "rectangle, a disk or a planar mesh"
+            )
+
+
 def check_scene(scene: Scene) -> None:
     """Checks bodies, sources and screen of a loaded scene.
 
@@ -94,7 +112,10 @@ def check_scene(scene: Scene) -> None:
                     f"{source.name}: the source lies inside {body.name!r}; move it out, or turn the faces "
                     "inward (flip_normals) if that is a room"
                 )
-    check_screen(scene)
+    check_screen(replace(scene, sources=tuple(source for source in scene.sources if source.aperture is None)))
+    for source in scene.sources:
+        if source.aperture is not None:
+            check_aperture(scene, source)
 
 
 def _check_body(body: Body) -> None:

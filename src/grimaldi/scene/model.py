@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,11 +15,21 @@ Vector = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
+class Spot:
+    """A beam's profile: 1 within `beam_width` of its axis, falling linearly with the angle to 0 at `cutoff` [rad]."""
+
+    axis: Vector  # (3,), unit
+    beam_width: float
+    cutoff: float
+
+
+@dataclass(frozen=True, eq=False)
 class Source:
     """One monochromatic source, a point (eq. 1) or a plane wave (eq. 2).
 
-    Exactly one of `position` and `direction` is set. `tint` (channels,) is the power of each colour
-    channel of the light relative to their mean, so that channel c has the amplitude
+    Exactly one of `position` and `direction` is set. A point may have the profile of a `spot`; a plane wave may come
+    out of an `aperture`, which is the shape of index `shape` in `mi.Scene.shapes()`. `tint` (channels,) is the power
+    of each colour channel of the light relative to their mean, so that channel c has the amplitude
     `amplitude * sqrt(tint[c])`.
     """
 
@@ -31,6 +41,9 @@ class Source:
     direction: Vector | None = None  # d (3,), unit
     origin: Vector = field(default_factory=lambda: np.zeros(3))  # O (3,) of eq. 2
     tint: tuple[float, ...] = (1.0, 1.0, 1.0)
+    spot: Spot | None = None
+    aperture: PlanarOutline | None = None
+    shape: int | None = None
 
     @property
     def is_plane(self) -> bool:
@@ -94,3 +107,10 @@ class Scene:
     def screen(self) -> tuple[PlanarOutline, ...]:
         """The planar outlines that act: the holes of the one screen, or the masks."""
         return self.holes or self.masks
+
+    def before(self, source: Source) -> Scene:
+        """The scene as the waves of one of its sources meet it: behind the aperture that they come out of."""
+        if source.aperture is None:
+            return self
+        others = tuple(body for body in self.bodies if body.shape != source.shape)
+        return replace(self, bodies=others, holes=(source.aperture,), masks=())
