@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from grimaldi import __version__
-from grimaldi.cli import doctor, field, outline, render
+from grimaldi.cli import doctor, field, figures, outline, render
 
 
 def _version(asked: bool) -> None:
@@ -36,4 +36,5 @@ app = typer.Typer(
 app.command("render")(render.render)
 app.command("field")(field.field)
 app.command("outline")(outline.outline)
+app.command("figures")(figures.figures)
 app.command("doctor")(doctor.doctor)
