@@ -56,7 +56,7 @@ def draw(settings: Settings) -> Figure:
                 "The head comes out too bright, because its mesh is finer.",
                 "bettered",
                 f"Along the creature's outline the report's sources are {low:.2g} to {high:.2g} times as strong as "
-                "their length asks for (10th to 90th percentile). The boundary integral adds dφ: cutting an edge changes "
+                "their length asks for (10th to 90th percentile). The boundary integral adds dφ: cutting changes "
                 "nothing, to rounding.",
             ),
             Answer(
