@@ -9,7 +9,9 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+import oracle
 import pytest
+from optics import affine, factor, shape
 from scipy.ndimage import median_filter
 
 import grimaldi
@@ -82,3 +84,24 @@ def test_no_spike_at_the_rim_of_killeroos_shadow(x, wavelength):
 
 def test_no_spike_at_the_rim_of_the_creatures_shadow():
     assert_no_spike(creature((127.1, 120.0, 80.0)))
+
+
+CORNERS = np.array([[-50, -50], [50, -50], [50, 50], [-50, 50.0]])
+
+
+@pytest.mark.parametrize("corner", CORNERS)
+def test_a_ray_exactly_through_a_corner(corner):
+    """M runs smoothly there too: both edges that meet in it take the ray to pass on the same side."""
+    square = grimaldi.PlanarOutline(CORNERS)
+    light = oracle.Plane((0, 0, 1))
+    points = np.array([[*(corner + shift), 2000] for shift in ([0, 0], [1e-5, 2e-5], [-1e-5, 1e-5])])
+    exact, *near = factor(light, points, outlines=[square], precision="double")
+    np.testing.assert_allclose(exact, near, atol=3e-3)
+
+
+@pytest.mark.parametrize("precision", ["auto", "double"])
+def test_a_ray_exactly_through_the_joint_of_two_segments_gives_a_number(precision):
+    """A long edge is cut up, here also right behind the point."""
+    sheet = shape("rectangle", affine((40, 1000, 1)))
+    there, beside = factor(oracle.Plane((0, 0, 1)), [[40, 0, 2000], [40, 1, 2000]], sheet, precision=precision)
+    assert there == pytest.approx(beside, abs=0.03)

@@ -55,7 +55,7 @@ def _planar(scene: Scene, source: Source, tab: Table, k: float, rule: Rule) -> E
 
     def evaluate(receivers: Receivers) -> Factor:
         shaded = receivers.active & far(receivers.p)
-        fr = frame(source, receivers.p, tab.centre, tab.types)
+        fr = frame(source, receivers.p, tab)
         sums, n = planar_sum(fr, tab, k, rule, shaded)
         m = _factor(tab, rule, n, -1, sums) if hole else _factor(tab, rule, 1 - n, 1, sums)
         return Factor(dr.select(shaded, m.real, 1), dr.select(shaded, m.imag, 0), dr.select(shaded, m.error, 0))
@@ -67,7 +67,7 @@ def _bodies(scene: Scene, source: Source, tab: Table, sag: float, k: float, rule
     probe = rays(scene, source, sag)
 
     def evaluate(receivers: Receivers) -> Factor:
-        fr = frame(source, receivers.p, tab.centre, tab.types)
+        fr = frame(source, receivers.p, tab)
         sums, nearest = body_sum(
             fr,
             tab,

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from grimaldi.diffraction.arrays import Types, types
+from grimaldi.diffraction.arrays import types
 from grimaldi.scene.model import Source, Spot, Vector
+
+if TYPE_CHECKING:
+    from grimaldi.diffraction.table import Table
+
+ASIDE = (0.36161, 0.48757, 0.79467)  # no direction in which people place corners
 
 
 class Frame(NamedTuple):
@@ -27,14 +32,15 @@ def constant(Vector3: Any, v: Vector) -> Any:
     return Vector3(*(float(x) for x in v))
 
 
-def frame(source: Source, p: Any, centre: Vector, out: Types) -> Frame:
-    """The frame of every ray source → p (Float64), about `centre` (3,), in the precision `out`.
+def frame(source: Source, p: Any, table: Table) -> Frame:
+    """The frame of every ray source → p (Float64), about the outlines' centre, in the precision of their table.
 
-    The cancellation q = X - S - z1 a is done here, against the foot of `centre` on the ray, so that Float32
-    coordinates stay small however far S and P are (THEORY 2, "Consequences").
+    The cancellation q = X - S - z1 a is done here, against the foot of the centre on the ray, so that Float32
+    coordinates stay small however far S and P are (THEORY 2, "Consequences"). The ray is moved aside by what
+    rounding leaves open: through a corner exactly, the edges that meet there could not agree on its side.
     """
-    V = types(double=True).Vector
-    c = constant(V, centre)
+    V, out = types(double=True).Vector, table.types
+    c = constant(V, table.centre)
     if source.is_plane:
         assert source.direction is not None
         a = constant(V, source.direction)
@@ -50,6 +56,8 @@ def frame(source: Source, p: Any, centre: Vector, out: Types) -> Frame:
         z1 = dr.dot(c - s, a)
         z2 = distance - z1
         foot = s - c + z1 * a
+    aside = constant(V, (1e-12 if dr.itemsize_v(out.Float) == 8 else 5e-7) * np.array(ASIDE))
+    foot += (table.reach + dr.norm(foot)) * (aside - dr.dot(aside, a) * a)
     return Frame(out.Vector(a), out.Vector(foot), out.Float(z1), out.Float(z2), source.is_plane)
 
 

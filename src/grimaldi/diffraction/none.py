@@ -58,7 +58,7 @@ def _planar(scene: Scene, source: Source, outline: Outline) -> Evaluate:
 
     def evaluate(receivers: Receivers) -> Factor:
         shaded = receivers.active & far(receivers.p)
-        n = planar_count(frame(source, receivers.p, tab.centre, tab.types), tab, shaded)
+        n = planar_count(frame(source, receivers.p, tab), tab, shaded)
         passed = n if scene.screen[0].hole else 1 - n
         zero = tab.types.Float(0)
         return Factor(dr.select(shaded, passed, 1), zero, zero)

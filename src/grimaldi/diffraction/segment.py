@@ -168,7 +168,8 @@ def sincos(x: Any) -> tuple[Any, Any]:
 
 def _asinh(x: Any) -> Any:
     m = dr.abs(x)
-    return dr.copysign(dr.log(m + dr.sqrt(dr.fma(m, m, 1))), x)
+    root = dr.select(m < 1e9, dr.sqrt(dr.fma(m, m, 1)), m)  # squares run over in Float32
+    return dr.copysign(dr.log(m + root), x)
 
 
 @dr.syntax

@@ -41,6 +41,7 @@ class Table(NamedTuple):
     """An outline about its centre (3,) in Float64, as flat device buffers."""
 
     centre: Vector
+    reach: float  # from the centre to the furthest corner
     size: int  # segments
     n_pieces: int
     segments: Any
@@ -121,6 +122,7 @@ def table(outline: Outline, types: Types, ranges: NDArray[np.int64] | None = Non
     index = dr.uint32_array_t(types.Float)
     return Table(
         centre,
+        float(np.linalg.norm(np.concatenate([X0, X1]), axis=1).max()),
         len(outline),
         len(middle),
         types.buffer(segments),

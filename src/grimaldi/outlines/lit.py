@@ -78,7 +78,8 @@ def _crossings(source: Source, edges: Candidates) -> tuple[Integers, Reals]:
     a, b = view(source, edges.start), view(source, edges.end)
     centres, radii = 0.5 * (a + b), 0.5 * np.linalg.norm(b - a, axis=1)
     scale = 1.0 if not source.is_plane else max(float(np.ptp(centres, axis=0).max()), 1e-300)
-    wide = WIDE * scale
+    # few edges much longer than most would make the tree's search wide for all
+    wide = min(WIDE * scale, 8 * float(np.median(radii)))
     radii = radii * (1 + radii / scale) + 1e-12 * scale
     balls = Balls(centres, radii, wide)
     i, j = balls.holding(centres, balls.widest)
