@@ -79,7 +79,7 @@ def serialized(face: Sequence[int]) -> bytes:
         (binary(CORNERS, [[0, 1, 2], [0, 1, 4]]), "face 1 joins vertices 0, 1, 4, but there are 4"),
         (binary(CORNERS, [[0, 1, 2**31 - 1]]), "face 0 joins vertices 0, 1, 2147483647"),
         (binary(CORNERS, [[0, 1, -1]]), "face 0 joins vertices 0, 1, -1"),
-        (binary(CORNERS, [[0, 1, 2, 3]]), "face 0 has 4 corners; triangulate"),
+        (binary(CORNERS, [[0, 1], [0, 1, 2]]), "face 0 has 2 corners; give three or more"),
         (binary(moved(np.nan), [[0, 1, 2]]), r"vertex 2 is at \(0, nan, 0\)"),
         (binary(moved(-np.inf), [[0, 1, 2]]), r"vertex 2 is at \(0, -inf, 0\)"),
         (binary(moved(1e30), [[0, 1, 2]]), r"vertex 2 is at \(0, 1e\+30, 0\)"),
@@ -133,9 +133,9 @@ def test_serialized_files(tmp_path: Path, content, says):
 @pytest.mark.parametrize(
     ("content", "says"),
     [
-        ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n", "invalid vertex 9"),
-        ("v 0 0 0\nv 1 0 0\nv 0 nan 0\nf 1 2 3\n", "invalid vertex position"),
-        ("v 0 0 0\nv 1 0 0\nv 0 1 0\n", "the mesh of 'obj' is empty"),
+        ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n", "face 0 joins vertices 0, 1, 8, but there are 3"),
+        ("v 0 0 0\nv 1 0 0\nv 0 nan 0\nf 1 2 3\n", "vertex 2 is at (0, nan, 0)"),
+        ("v 0 0 0\nv 1 0 0\nv 0 1 0\n", "the mesh is empty"),
     ],
 )
 def test_obj_files(tmp_path: Path, content, says):
@@ -251,7 +251,7 @@ MIRRORED = '<transform name="to_world"><scale x="-1"/></transform>'
         ),
         (FAR.format("point"), "lamp: position is too large, (1e+20, 0, 0); give coordinates below 1e+18"),
         (FAR.format("coherent_point"), "lamp: position is too large"),
-        (FLAT.format("disk"), "plate: to_world flattens the disk; give a scale that is nowhere 0"),
+        (FLAT.format("disk"), "plate: to_world flattens it; give a scale, and a radius, that is nowhere 0"),
         (FLAT.format("rectangle"), "plate: all faces have zero area"),
         (BOX.format("", INSIDE), "lamp: the source lies inside 'box'; move it out"),
         (

@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 
 from grimaldi.diffraction.arrays import types
 from grimaldi.outlines.candidate import toward
+from grimaldi.outlines.cylinder import strip
 from grimaldi.outlines.sphere import across, tangent_circle
-from grimaldi.scene.model import Disk, Geometry, Mesh, Source, Sphere
+from grimaldi.scene.model import Cylinder, Disk, Geometry, Mesh, Source, Sphere
 from grimaldi.scene.planar import PlanarOutline
 
 Reals = NDArray[np.float64]
@@ -88,6 +89,8 @@ def _planar(shape: PlanarOutline, source: Source) -> Patches:
 def _body(shape: Geometry, source: Source) -> Patches:
     if isinstance(shape, Mesh):
         return _triangles(shape.vertices[shape.faces], source)
+    if isinstance(shape, Cylinder):
+        return _body(strip(shape, source, 1e-5 * float(np.linalg.norm(shape.to_world[:3, :2]))), source)
     if isinstance(shape, Disk):
         return _ellipse(shape.to_world, source)
     return _cap(shape, source)

@@ -22,6 +22,12 @@ class Candidates:
     faces: Integers  # (n, 2) the body's triangles beside the edge: they cannot hide it; -1 where there is none
 
     @staticmethod
+    def empty() -> Candidates:
+        """No edge."""
+        points, none = np.empty((0, 3)), np.empty(0, np.int64)
+        return Candidates(points, points, np.empty((0, 2, 3)), none, np.empty((0, 2), np.int64))
+
+    @staticmethod
     def concatenate(parts: Sequence[Candidates]) -> Candidates:
         return Candidates(*(np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(Candidates)))
 

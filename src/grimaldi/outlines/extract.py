@@ -6,12 +6,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from grimaldi.outlines import disk, mesh, planar, sphere
+from grimaldi.outlines import cylinder, disk, mesh, planar, sphere
 from grimaldi.outlines.candidate import Candidates, toward
 from grimaldi.outlines.hidden import Obstacle, Queries, behind, obstacles
 from grimaldi.outlines.lit import Stretches, lit_parts
 from grimaldi.outlines.model import Integers, Outline, Reals
-from grimaldi.scene.model import Body, Geometry, Mesh, Scene, Source, Sphere
+from grimaldi.scene.bodies import vertices
+from grimaldi.scene.model import Body, Cylinder, Geometry, Mesh, Scene, Source, Sphere
 from grimaldi.scene.planar import PlanarOutline
 
 LONGEST = 1 / 32  # of the outlines' extent: how finely X→P visibility is told along a straight edge
@@ -50,8 +51,9 @@ def curve(shape: Geometry | PlanarOutline) -> tuple[Reals, float]:
     """Centre (3,) and size of a shape's outline: what the sag of its polygon is measured against."""
     if isinstance(shape, Sphere):
         return shape.centre, shape.radius
-    if isinstance(shape, Mesh):
-        low, high = shape.vertices.min(axis=0), shape.vertices.max(axis=0)
+    if isinstance(shape, (Mesh, Cylinder)):
+        points = vertices(shape)
+        low, high = points.min(axis=0), points.max(axis=0)
         return 0.5 * (low + high), 0.5 * float(np.linalg.norm(high - low))
     return shape.to_world[:3, 3], float(np.linalg.norm(shape.to_world[:3, :2]))
 
@@ -62,6 +64,8 @@ def _silhouette(body: Body, source: Source, sag: float) -> Candidates:
         return mesh.silhouette(geometry, source)
     if isinstance(geometry, Sphere):
         return sphere.silhouette(geometry, source, sag)
+    if isinstance(geometry, Cylinder):
+        return cylinder.silhouette(geometry, source, sag)
     return disk.silhouette(geometry, source, sag)
 
 

@@ -11,7 +11,7 @@ from scipy.spatial import KDTree
 
 from grimaldi.outlines.candidate import toward
 from grimaldi.outlines.model import Integers, Reals
-from grimaldi.scene.model import Body, Disk, Mesh, Source, Sphere
+from grimaldi.scene.model import Body, Cylinder, Disk, Mesh, Source, Sphere
 
 TOUCHING = 1e-9  # of the way to the source (of the scene's size for a plane wave): no nearer blocker counts
 WIDE = 0.05  # view radius above which a triangle is held against every point
@@ -58,7 +58,7 @@ class Triangles:
     balls: Balls
 
 
-Obstacle = Triangles | Sphere | Disk
+Obstacle = Triangles | Sphere | Disk | Cylinder
 
 
 def obstacles(bodies: tuple[Body, ...], source: Source) -> tuple[Obstacle, ...]:
@@ -108,6 +108,9 @@ def hidden(obstacles: tuple[Obstacle, ...], source: Source, queries: Queries) ->
         if isinstance(obstacle, Triangles):
             for point, t in _meetings(obstacle, source, open_, own):
                 result[rest[point[_between(source, t, least)]]] = True
+        elif isinstance(obstacle, Cylinder):
+            for t in _on_tube(obstacle, source, open_.x, own):
+                result[rest[_between(source, t, least)]] = True
         else:
             other = rest[~own]
             x = queries.x[other]
@@ -126,14 +129,24 @@ def _between(source: Source, t: Reals, least: float) -> NDArray[np.bool_]:
 def behind(obstacle: Obstacle, source: Source, queries: Queries) -> Reals:
     """How far behind each point, away from the source, its own body comes next [scene units]; inf where it does not."""
     result = np.full(len(queries.x), np.inf)
-    if not isinstance(obstacle, Triangles):
-        return result
     own = np.ones(len(queries.x), bool)
-    for point, t in _meetings(obstacle, source, queries, own):
+    for point, t in _own_meetings(obstacle, source, queries, own):
         away = t < -TOUCHING
         length = np.linalg.norm(toward(source, queries.x[point]), axis=1)
         np.minimum.at(result, point[away], (-t * length)[away])
     return result
+
+
+def _own_meetings(
+    obstacle: Obstacle, source: Source, queries: Queries, own: NDArray[np.bool_]
+) -> Iterator[tuple[Integers, Reals]]:
+    """Where lines that touch a body's outline meet it again, as `_meetings`; spheres and discs never."""
+    if isinstance(obstacle, Triangles):
+        yield from _meetings(obstacle, source, queries, own)
+    elif isinstance(obstacle, Cylinder):
+        for t in _on_tube(obstacle, source, queries.x, own):
+            met = np.flatnonzero(np.isfinite(t))
+            yield met, t[met]
 
 
 def _meetings(
@@ -167,6 +180,24 @@ def _by_sphere(sphere: Sphere, source: Source, x: Reals, least: float) -> NDArra
     root = b * b - a * (c - sphere.radius**2)
     reach = np.sqrt(np.maximum(root, 0))
     return (root > 0) & (_between(source, (-b - reach) / a, least) | _between(source, (-b + reach) / a, least))
+
+
+def _on_tube(tube: Cylinder, source: Source, x: Reals, own: NDArray[np.bool_]) -> tuple[Reals, Reals]:
+    """Both t where x + t·toward meets a tube's wall, NaN where it does not; from its own points only the other one."""
+    inverse = np.linalg.inv(tube.to_world)
+    p = x @ inverse[:3, :3].T + inverse[:3, 3]
+    w = toward(source, x) @ inverse[:3, :3].T
+    across = np.linalg.norm(p[:, :2], axis=1)
+    round_ = np.where(own[:, None], p[:, :2] / np.maximum(across, 1e-300)[:, None], p[:, :2])
+    a, b = (w[:, :2] ** 2).sum(1), (round_ * w[:, :2]).sum(1)
+    c = np.where(own, 0.0, across**2 - 1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        # the roots' stable form: their sum and their product
+        far = -(b + np.copysign(np.sqrt(b * b - a * c), b))
+        roots = far / a, np.where(own, np.nan, c / far)
+        heights = (p[:, 2] + t * w[:, 2] for t in roots)
+        first, second = (np.where((z >= 0) & (z <= 1), t, np.nan) for t, z in zip(roots, heights, strict=True))
+    return first, second
 
 
 def _by_disk(disk: Disk, source: Source, x: Reals, least: float) -> NDArray[np.bool_]:

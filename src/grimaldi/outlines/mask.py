@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from grimaldi.outlines.cylinder import strip
 from grimaldi.outlines.model import Reals
 from grimaldi.outlines.projection import Projection, projection
 from grimaldi.outlines.sphere import across, tangent_circle
 from grimaldi.scene.bodies import is_flat, plane, vertices
-from grimaldi.scene.model import Body, Disk, Mesh, Scene, Source
+from grimaldi.scene.model import Body, Cylinder, Disk, Mesh, Scene, Source
 
 if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry
@@ -106,6 +107,8 @@ def _surrounds(body: Body, source: Source) -> bool:
 def _triangles(body: Body, source: Source) -> Reals:
     """Triangles (m, 3, 3) in space that cover what the body covers, seen from the source."""
     geometry = body.geometry
+    if isinstance(geometry, Cylinder):
+        geometry = strip(geometry, source, 1e-4 * float(np.linalg.norm(geometry.to_world[:3, :2])))
     if isinstance(geometry, Mesh):
         return geometry.vertices[geometry.faces]
     if isinstance(geometry, Disk):

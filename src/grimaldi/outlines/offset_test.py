@@ -11,20 +11,21 @@ import mitsuba
 import numpy as np
 from numpy.typing import NDArray
 
-from grimaldi.outlines import disk
+from grimaldi.outlines import cylinder, disk
 from grimaldi.outlines.candidate import Candidates, closed_curve, polygon, toward
 from grimaldi.outlines.extract import assemble, curve, gap_behind
 from grimaldi.outlines.hidden import Queries, hidden, obstacles
 from grimaldi.outlines.lit import Stretches
 from grimaldi.outlines.mesh import has_corners, normals_beside, weld
 from grimaldi.outlines.model import Outline, Reals
-from grimaldi.outlines.sphere import across
-from grimaldi.scene.model import Mesh, Scene, Source, Sphere
+from grimaldi.outlines.sphere import across, tangent_circle
+from grimaldi.scene.model import Cylinder, Disk, Mesh, Scene, Source, Sphere
 
 mi: Any = mitsuba  # the stubs refuse numbers where arrays are asked for
 
 EPSILON = 2e-4  # of a body's size, where none is given
 CIRCLE = 32  # edges of a circle, as much as a mesh's
+SAG = np.pi**2 / (2 * CIRCLE**2)  # of the radius: how far they lie from it
 DEEP = 0.02  # of a body's size: how far beyond an edge a ray has to be free, so that grazing faces do not count
 
 
@@ -33,7 +34,8 @@ def offset_outline(scene: Scene, source: Source, epsilon: float | None = None) -
 
     epsilon: how far beside an edge the rays pass [scene units]; 2e-4 of each body's size unless given. Of a mesh
     the edges of whose two rays one passes and the other does not; of a sphere the great circle across the light,
-    of a disk the rim, both as 32 edges, where the source reaches their middles.
+    of a disk the rim, of a cylinder both rims and its tangent lines, each as about 32 edges, where the source reaches
+    their middles.
     """
     standing = obstacles(scene.bodies, source)
     parts: list[Candidates] = []
@@ -42,7 +44,7 @@ def offset_outline(scene: Scene, source: Source, epsilon: float | None = None) -
         if isinstance(geometry, Mesh):
             parts.append(_mesh(scene, geometry, source, epsilon or EPSILON * curve(geometry)[1]))
             continue
-        edges = _great_circle(geometry, source) if isinstance(geometry, Sphere) else _rim(geometry, source)
+        edges = _great_circle(geometry, source) if isinstance(geometry, Sphere) else _rims(geometry, source)
         own = np.full(len(edges.start), number)
         parts.append(_taken(edges, ~hidden(standing, source, Queries(_middle(edges), own, edges.faces))))
     if not any(len(part.start) for part in parts):
@@ -62,17 +64,21 @@ def _taken(edges: Candidates, which: NDArray[np.bool_]) -> Candidates:
 
 
 def _great_circle(sphere: Sphere, source: Source) -> Candidates:
-    light = -toward(source, sphere.centre[None])[0]
-    x, y = across(light / np.linalg.norm(light))
+    _, touched, light = tangent_circle(sphere, source)
+    if touched == 0:
+        return Candidates.empty()
+    x, y = across(light)
     corners = sphere.centre + sphere.radius * polygon(CIRCLE) @ np.stack([x, y])
     radial = 0.5 * (corners + np.roll(corners, -1, axis=0)) - sphere.centre
     normal = radial / np.linalg.norm(radial, axis=1, keepdims=True)
     return closed_curve(corners, np.stack([normal, normal], axis=1))
 
 
-def _rim(shape: Any, source: Source) -> Candidates:
-    size = curve(shape)[1]
-    return disk.silhouette(shape, source, size * np.pi**2 / (2 * CIRCLE**2))
+def _rims(shape: Disk | Cylinder, source: Source) -> Candidates:
+    if isinstance(shape, Cylinder):
+        radius = float(np.linalg.norm(shape.to_world[:3, :2], axis=0).max())
+        return cylinder.silhouette(shape, source, radius * SAG)
+    return disk.silhouette(shape, source, curve(shape)[1] * SAG)
 
 
 def _mesh(scene: Scene, mesh: Mesh, source: Source, epsilon: float) -> Candidates:

@@ -10,8 +10,10 @@ from grimaldi.scene.model import Source, Sphere
 
 
 def silhouette(sphere: Sphere, source: Source, sag: float) -> Candidates:
-    """The tangent circle, as a polygon within `sag` of it."""
+    """The tangent circle, as a polygon within `sag` of it; none around the source."""
     centre, radius, axis = tangent_circle(sphere, source)
+    if radius == 0:
+        return Candidates.empty()
     x, y = across(axis)
     # counter-clockwise about the direction of travel
     corners = centre + radius * polygon(segments_for(radius, sag)) @ np.stack([x, y])
@@ -21,13 +23,18 @@ def silhouette(sphere: Sphere, source: Source, sag: float) -> Candidates:
 
 
 def tangent_circle(sphere: Sphere, source: Source) -> tuple[Reals, float, Reals]:
-    """Centre (3,), radius and axis (3,), unit along the light, of the circle of tangent rays."""
+    """Centre (3,), radius and axis (3,), unit along the light, of the circle of tangent rays.
+
+    Radius 0 where the source is inside, as in a room: nothing is touched.
+    """
     if source.position is None:
         assert source.direction is not None
         return sphere.centre, sphere.radius, source.direction
     d = sphere.centre - source.position
     distance = float(np.linalg.norm(d))
-    sine = min(sphere.radius / distance, 1.0)  # from inside, as in a room, nothing is touched
+    if distance <= sphere.radius:
+        return source.position, 0.0, d / distance if distance > 0 else np.array([0.0, 0.0, 1.0])
+    sine = sphere.radius / distance
     return (
         sphere.centre - d * sine**2,
         sphere.radius * float(np.sqrt(1 - sine**2)),

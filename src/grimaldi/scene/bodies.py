@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from grimaldi.errors import InputError
-from grimaldi.scene.model import Body, Disk, Geometry, Mesh, Sphere
+from grimaldi.scene.model import Body, Cylinder, Disk, Geometry, Mesh, Sphere
 from grimaldi.scene.planar import PlanarOutline
 
 Reals = NDArray[np.float64]
@@ -32,7 +32,7 @@ class Shapes:
 def sort_shapes(shapes: Iterable[Any]) -> Shapes:
     """Opaque bodies, holes (BSDF `aperture`), and the rest, of `mi.Scene.shapes()`.
 
-    Opaque is a mesh, sphere or disk whose BSDF transmits nothing and that bounds no medium.
+    Opaque is a mesh, sphere, disk or cylinder whose BSDF transmits nothing and that bounds no medium.
 
     Raises:
         InputError: an aperture that is no rectangle, disk or planar mesh.
@@ -96,6 +96,8 @@ def vertices(geometry: Geometry) -> Reals:
         return geometry.vertices
     if isinstance(geometry, Sphere):
         return geometry.centre + geometry.radius * _box_corners()
+    if isinstance(geometry, Cylinder):
+        return (_box_corners() * [1, 1, 0.5] + [0, 0, 0.5]) @ geometry.to_world[:3, :3].T + geometry.to_world[:3, 3]
     return _square(geometry.to_world)
 
 
@@ -115,7 +117,7 @@ def _is_opaque(shape: Any) -> bool:
     import mitsuba as mi
 
     mesh = shape.is_mesh() and shape.class_name() != "EllipsoidsMesh"
-    if not (mesh or shape.class_name() in ("Sphere", "Disk")) or shape.is_medium_transition():
+    if not (mesh or shape.class_name() in ("Sphere", "Disk", "Cylinder")) or shape.is_medium_transition():
         return False
     bsdf = shape.bsdf()
     return bsdf is not None and not bsdf.flags() & int(mi.BSDFFlags.Transmission)
@@ -129,6 +131,8 @@ def _geometry(shape: Any) -> Geometry:
     to_world = _to_world(shape)
     if shape.class_name() == "Disk":
         return Disk(to_world)
+    if shape.class_name() == "Cylinder":
+        return Cylinder(to_world)
     # Mitsuba drops a sphere's non-uniform scale, though to_world keeps it: the area tells what it renders.
     area = float(np.array(shape.surface_area()).reshape(-1)[0])
     return Sphere(to_world[:3, 3].copy(), float(np.sqrt(area / (4 * np.pi))))

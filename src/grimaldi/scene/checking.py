@@ -16,6 +16,7 @@ from grimaldi.scene.bodies import faces_inward, vertices
 from grimaldi.scene.messages import where
 from grimaldi.scene.model import Body, Mesh, Scene, Sphere
 from grimaldi.scene.ply import check_ply
+from grimaldi.scene.polygons import check_obj
 from grimaldi.scene.screen import check_aperture, check_screen
 from grimaldi.scene.serialized import check_serialized
 from grimaldi.scene.sources import ZERO_DIRECTION
@@ -54,16 +55,16 @@ def check_nodes(state: Any) -> None:
     for node in state.nodes:
         plugin, props = node.props.plugin_name(), node.props
         place = where(mi.parser.file_location(state, node))
-        if plugin in ("ply", "serialized") and isinstance(name := props.get("filename", None), str):
+        if plugin in ("ply", "obj", "serialized") and isinstance(name := props.get("filename", None), str):
             file = Path(str(resolver.resolve(name)))
             if not file.is_file():
                 raise InputError(f"{place}: file {name!r} not found; name it relative to the scene's folder")
-            if plugin == "ply":
-                check_ply(file)
-            else:
+            if (plugin == "ply" and check_ply(file)) or (plugin == "obj" and check_obj(file)):
+                props.set_plugin_name("polygons")
+            elif plugin == "serialized":
                 check_serialized(file, _whole_number(props, "shape_index", 0, place))
-        elif plugin == "sphere" and isinstance(radius := props.get("radius", None), (int, float)):
-            _check_radius(radius, place)
+        elif plugin in ("sphere", "cylinder") and isinstance(radius := props.get("radius", None), (int, float)):
+            _check_radius(radius, place, plugin)
         elif plugin == "hdrfilm":
             width = _whole_number(props, "width", 768, place)
             height = _whole_number(props, "height", 576, place)
@@ -130,7 +131,7 @@ def _check_body(body: Body) -> None:
     elif not (np.abs(geometry.to_world) < LARGEST).all():
         raise InputError(f"{body.name}: to_world is not finite; give finite numbers below {LARGEST:g}")
     elif np.linalg.matrix_rank(geometry.to_world[:3, :3]) < 3:
-        raise InputError(f"{body.name}: to_world flattens the disk; give a scale that is nowhere 0")
+        raise InputError(f"{body.name}: to_world flattens it; give a scale, and a radius, that is nowhere 0")
 
 
 def _check_area(mesh: Mesh, name: str) -> None:
@@ -146,9 +147,9 @@ def _whole_number(props: Any, name: str, default: int, place: str) -> int:
     return value
 
 
-def _check_radius(radius: float, place: str) -> None:
+def _check_radius(radius: float, place: str, shape: str = "sphere") -> None:
     if not (math.isfinite(radius) and radius > 0):
-        raise InputError(f"{place}: the sphere's radius is {radius:g}; give a positive number")
+        raise InputError(f"{place}: the {shape}'s radius is {radius:g}; give a positive number")
 
 
 def _warn_of_shared_edges(mesh: Mesh, name: str) -> None:

@@ -13,6 +13,7 @@ from grimaldi.conventions import did_you_mean
 from grimaldi.errors import GrimaldiWarning, InputError
 from grimaldi.scene.bodies import blockers, sort_shapes
 from grimaldi.scene.checking import check_nodes, check_scene
+from grimaldi.scene.instances import write_out
 from grimaldi.scene.messages import one_line
 from grimaldi.scene.model import Scene
 from grimaldi.scene.planar import PlanarOutline
@@ -166,6 +167,7 @@ def _instantiate(config: Any, state: Any) -> tuple[Any, str | None]:
             raise InputError(f"scene_unit: {unit!r} has no unit; write it like '1 um'")
         del state.root.props["scene_unit"]
     mi.parser.transform_all(config, state)
+    write_out(state)
     check_nodes(state)
     return mi.parser.instantiate(config, state), unit
 

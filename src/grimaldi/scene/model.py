@@ -71,7 +71,14 @@ class Disk:
     to_world: Vector
 
 
-Geometry = Mesh | Sphere | Disk
+@dataclass(frozen=True, eq=False)
+class Cylinder:
+    """The open tube x² + y² = 1, 0 <= z <= 1 under the affine map `to_world` (4, 4)."""
+
+    to_world: Vector
+
+
+Geometry = Mesh | Sphere | Disk | Cylinder
 
 
 @dataclass(frozen=True, eq=False)

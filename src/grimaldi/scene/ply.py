@@ -1,14 +1,18 @@
-"""Reads PLY files just far enough to refuse those that crash Mitsuba or that it reads wrongly."""
+"""Reads PLY files: to refuse those that crash Mitsuba or that it reads wrongly, and for their polygons."""
 
 from __future__ import annotations
 
+import struct
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from grimaldi.errors import InputError
+from grimaldi.scene.polygons import triangles
 from grimaldi.scene.triangles import check_triangles
 
 _ANEW = "export the mesh anew"
@@ -28,8 +32,28 @@ class _Element:
     properties: list[tuple[str, str, str | None]] = field(default_factory=list)
 
 
-def check_ply(path: Path) -> None:
-    """Raises InputError unless `path` is a whole PLY file of triangles whose corners exist and are finite."""
+def check_ply(path: Path) -> bool:
+    """Whether a PLY file has polygons of other than three corners, which Mitsuba does not read.
+
+    Raises InputError unless it is a whole PLY file whose faces' corners exist and are finite.
+    """
+    try:
+        rows = _rows(path)
+    except _Polygons:
+        points, polygons = read_ply(path)
+        check_triangles(points, triangles(points, polygons, str(path)), str(path))
+        return True
+    positions = np.stack([rows["vertex"][axis] for axis in "xyz"], axis=1)
+    check_triangles(positions, rows["face"]["vertices"], str(path))
+    return False
+
+
+class _Polygons(Exception):
+    """A face has other than three corners."""
+
+
+def _rows(path: Path) -> dict[str, NDArray[np.void]]:
+    """The elements' rows of a PLY file of triangles; `_Polygons` where it is none."""
     try:
         data = path.read_bytes()
     except OSError as error:
@@ -52,8 +76,54 @@ def check_ply(path: Path) -> None:
         raise InputError(f"{path}: vertices have no x, y, z; {_ANEW}")
     if "vertices" not in (rows["face"].dtype.names or ()):
         raise InputError(f"{path}: faces have no vertex_indices; {_ANEW}")
-    positions = np.stack([rows["vertex"][axis] for axis in "xyz"], axis=1)
-    check_triangles(positions, rows["face"]["vertices"], str(path))
+    return rows
+
+
+def read_ply(path: Path) -> tuple[NDArray[np.float64], list[list[int]]]:
+    """Vertices (n, 3) and polygons of a PLY file, row by row.
+
+    Raises InputError where the file ends early or has no vertices and faces that can be read.
+    """
+    data = path.read_bytes()
+    order, elements, at = _header(data, path)
+    values = _ascii_values(data[at:]) if not order else _binary_values(data, at, order)
+    points: list[list[float]] = []
+    polygons: list[list[int]] = []
+    try:
+        for element in elements:
+            for _ in range(element.count):
+                row: dict[str, Any] = {}
+                for name, kind, length in element.properties:
+                    if length is None:
+                        row[name] = values(kind)
+                    else:
+                        row[name] = [int(values(kind)) for _ in range(int(values(length)))]
+                if element.name == "vertex":
+                    points.append([float(row[axis]) for axis in "xyz"])
+                elif element.name == "face":
+                    polygons.append(row["vertex_indices"] if "vertex_indices" in row else row["vertex_index"])
+    except (StopIteration, struct.error, ValueError, OverflowError, KeyError) as error:
+        raise InputError(f"{path}: is cut off or holds something that is no number; {_ANEW}") from error
+    return np.array(points, np.float64).reshape(-1, 3), polygons
+
+
+def _ascii_values(data: bytes) -> Callable[[str], float]:
+    tokens = iter(data.split())
+    return lambda kind: float(next(tokens))
+
+
+def _binary_values(data: bytes, at: int, order: str) -> Callable[[str], float]:
+    """The next value of a type ("f4") at a time."""
+    place = at
+    codes = {"i1": "b", "u1": "B", "i2": "h", "u2": "H", "i4": "i", "u4": "I", "f4": "f", "f8": "d"}
+
+    def value(kind: str) -> float:
+        nonlocal place
+        (result,) = struct.unpack_from(order + codes[kind], data, place)
+        place += int(kind[1])
+        return result
+
+    return value
 
 
 def _header(data: bytes, path: Path) -> tuple[str, list[_Element], int]:
@@ -121,12 +191,11 @@ def _ascii_rows(
 
 
 def _check_whole(rows: NDArray[np.void], element: _Element, path: Path) -> None:
-    """As many rows as the header says; a polygon shifts all that follows it, so it is named first."""
+    """As many rows as the header says; a polygon shifts all that follows it, so it is told first."""
     if "corners" in (rows.dtype.names or ()):
         other = rows["corners"] != 3
         if other.any():
-            i = int(np.flatnonzero(other)[0])
-            raise InputError(f"{path}: face {i} has {int(rows['corners'][i])} corners; triangulate the mesh")
+            raise _Polygons
     if len(rows) < element.count:
         raise InputError(
             f"{path}: is cut off: the header says {element.count} {element.name} rows, "

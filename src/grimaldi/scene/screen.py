@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from grimaldi.errors import InputError, NotYet
 from grimaldi.scene.bodies import FLAT, is_flat, plane, vertices
-from grimaldi.scene.model import Body, Geometry, Mesh, Scene, Source, Sphere
+from grimaldi.scene.model import Body, Disk, Geometry, Mesh, Scene, Source, Sphere
 from grimaldi.scene.planar import PlanarOutline
 
 Reals = NDArray[np.float64]
@@ -144,7 +144,7 @@ def _may_hide(geometry: Geometry, hole: PlanarOutline, source: Source, normal: R
     else:
         far = ((faces - rim[0]) @ normal).max() / (towards[0] @ normal)
         cone = np.concatenate([rim, rim + far * towards])
-    if not isinstance(geometry, Sphere):
+    if isinstance(geometry, (Mesh, Disk)):
         across = np.cross(faces[:, 1] - faces[:, 0], faces[:, 2] - faces[:, 0])
         across /= np.maximum(np.linalg.norm(across, axis=1, keepdims=True), np.finfo(float).tiny)
         heights = across @ cone.T - np.einsum("ij,ij->i", across, faces[:, 0])[:, None]
@@ -168,7 +168,7 @@ def _check_receivers(bodies: list[Body], sources: tuple[Source, ...]) -> None:
     """Flat bodies each on the sources' side of every other one's plane hide nothing of each other."""
     points = [vertices(body.geometry) for body in bodies]
     for body, own in zip(bodies, points, strict=True):
-        if isinstance(body.geometry, Sphere) or not is_flat(own):
+        if not is_flat(own):
             raise NotYet(f"{body.name}: {_BESIDE}; only flat ones that receive the light are")
         centre, normal, _ = plane(own)
         for (other, theirs), source in itertools.product(zip(bodies, points, strict=True), sources):
