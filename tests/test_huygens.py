@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from typing import Any
 
 import mitsuba
 import numpy as np
 import oracle
 import pytest
-from optics import APERTURE, affine, factor, line, mesh, shape
+from optics import APERTURE, GREY, affine, emitter, factor, line, mesh, shape
 
 import grimaldi
 from grimaldi.errors import InputError
@@ -25,9 +27,9 @@ HUYGENS: dict[str, Any] = {"diffraction": "huygens", "precision": "double"}
 COUNTS = np.array([96, 192, 384, 768])
 
 
-def order(errors):
+def order(errors, counts=COUNTS):
     """The slope of log error against log n, with its sign turned."""
-    return -np.polyfit(np.log(COUNTS), np.log(errors), 1)[0]
+    return -np.polyfit(np.log(counts), np.log(errors), 1)[0]
 
 
 def edges(*loops):
@@ -59,6 +61,66 @@ def test_kernel_sources_converge_to_boundary_to_second_order(light, opening):
     errors = [np.abs(factor(light, BEHIND, sheet, n=int(n), weights="kernel", **HUYGENS) - exact).max() for n in COUNTS]
     assert errors[-1] < 1e-4
     assert order(errors) == pytest.approx(2, abs=0.15)
+
+
+CONCAVE = np.array([[-10, -9], [11, -8], [2, 1], [9, 12], [-12, 10]], float)
+TURNED = np.array([[0.8, 0, 0.6], [0, 1, 0], [-0.6, 0, 0.8]])
+BODIES: dict[str, dict[str, Any]] = {
+    "concave hole": {"outlines": [grimaldi.PlanarOutline(CONCAVE)]},
+    "cube": {"shapes": [shape("cube", affine(5, turn=TURNED))]},
+    "sphere": {"shapes": [{"type": "sphere", "radius": 6.0, "bsdf": GREY}]},
+}
+
+
+def computed(what, points, **options):
+    """M and its reported error, relative to |U0|, at points (n, 3) behind one of BODIES in the lamp's light."""
+    scene = {"type": "scene", "light": emitter(LAMP), **{f"s{i}": s for i, s in enumerate(what.get("shapes", ()))}}
+    loaded = grimaldi.load(scene, outlines=what.get("outlines", ()))
+    result = grimaldi.field(loaded, points, wavelength=1.0, **options)
+    incident = LAMP.wave(points, 2 * np.pi)[0]
+    return result.U.values[0, 0] / incident, result.error.values[0, 0] / np.abs(incident)
+
+
+@pytest.mark.parametrize("body", ["concave hole", "cube"])
+def test_kernel_sources_converge_at_a_concave_hole_and_a_solid_body(body):
+    counts = np.array([20, 40, 80, 160])
+    whole: dict[str, Any] = {"occlusion": False, "precision": "double"}  # or each source is hidden for itself
+    exact, _ = computed(BODIES[body], BEHIND, tolerance=1e-10, **whole)
+    options: dict[str, Any] = {"weights": "kernel", "diffraction": "huygens", **whole}
+    runs = [computed(BODIES[body], BEHIND, n=int(n), **options)[0] for n in counts]
+    assert order([np.abs(m - exact).max() for m in runs], counts) == pytest.approx(2, abs=0.15)
+
+
+@pytest.mark.parametrize("body", BODIES)
+def test_the_reported_error_of_kernel_sources_tells_their_distance_from_boundary(body):
+    """At five points in six no less, also for even n (whatever alternates along a circle cancels), nor far more."""
+    rng = np.random.default_rng(1)
+    points = rng.uniform([-30, -30, 30], [30, 30, 90], (200, 3))
+    exact, _ = computed(BODIES[body], points, tolerance=1e-6, precision="double")
+    for n in (20, 21) if body != "sphere" else (1, 2):
+        m, told = computed(BODIES[body], points, n=n, weights="kernel", diffraction="huygens")
+        off = np.abs(m - exact)
+        assert (off <= told).mean() > 0.8
+        assert np.median(told) < 5 * np.median(off) + 2e-4  # a tenth of the tolerance is for the circle's polygon
+
+
+@pytest.mark.parametrize("light", [LAMP, PLANE], ids=["point", "plane"])
+@pytest.mark.parametrize("hole", [True, False])
+def test_kernel_sources_have_no_jump_at_the_rim(light, hole):
+    """Sum and n take the side of an edge from one number: no M is off by 1, however Float32 rounds at the rim."""
+    angle, rng = 0.37, np.random.default_rng(0)
+    turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+    corners = CORNERS[:, :2] @ turn
+    along = (corners[1] - corners[0]) / 18
+    off = rng.choice([-1, 1], 300) * rng.choice([0, 1e-9, 1e-7, 1e-6, 1e-4], 300)
+    rim = corners[0] + rng.uniform(2, 16, (300, 1)) * along + off[:, None] * np.array([-along[1], along[0]])
+    points = np.c_[rim * (1 if light is PLANE else 2.5), np.full(300, 60.0)]
+    if light is LAMP:
+        points[:, :2] -= 1.5 * np.array([3, -2])
+    outlines = [grimaldi.PlanarOutline(corners, hole=hole)]
+    exact = factor(light, points, outlines=outlines, tolerance=1e-6)
+    by_sources = factor(light, points, outlines=outlines, n=400, weights="kernel", diffraction="huygens")
+    np.testing.assert_allclose(by_sources, exact, atol=0.01)
 
 
 @pytest.mark.parametrize("light", [LAMP, PLANE], ids=["point", "plane"])
@@ -100,6 +162,31 @@ def test_the_report_is_a_plain_sum_of_equal_lamps(tmp_path):
         s = np.linalg.norm(p - lamps, axis=1)
         expected[i] += (w * LAMP.wave(lamps, k)[0] * np.exp(1j * k * s) / s).sum() / LAMP.wave(p[None], k)[0][0]
     np.testing.assert_allclose(factor(LAMP, BEHIND, sheet, n=n, **HUYGENS), expected, atol=1e-9)
+
+
+@pytest.mark.parametrize("n", [1, 3])
+def test_the_report_weighs_a_uniform_mesh_by_length(tmp_path, n):
+    """Equal edges with as many sources each: the same lamps, so the same sum."""
+    angle = 2 * np.pi * np.arange(12) / 12
+    sheet = polygon_sheet(tmp_path / "sheet.obj", 7 * np.stack([np.cos(angle), np.sin(angle)], axis=1))
+    report, length = (factor(LAMP, BEHIND, sheet, n=n, weights=w, **HUYGENS) for w in ("report", "length"))
+    np.testing.assert_allclose(report, length, atol=1e-6)  # its corners are Float32
+
+
+def test_the_report_on_a_sphere_is_a_plain_sum_over_its_great_circle():
+    """Across the light, not where the light touches: THEORY 4."""
+    ball = {"type": "sphere", "radius": 6.0, "bsdf": GREY}
+    found = offset_outline(scene_of(ball), grimaldi.load({"type": "scene", "light": emitter(LAMP)}).sources[0])
+    k, n = 2 * np.pi, 4
+    t = (np.arange(n) + 0.5) / n
+    lamps = (found.start[:, None] + t[:, None] * (found.end - found.start)[:, None]).reshape(-1, 3)
+    w = np.linalg.norm(found.end - found.start, axis=1).sum() / len(lamps)
+    assert w * len(lamps) == pytest.approx(2 * np.pi * 6, rel=0.02)
+    expected = factor(LAMP, BEHIND, ball, diffraction="none")
+    for i, p in enumerate(BEHIND):
+        s = np.linalg.norm(p - lamps, axis=1)
+        expected[i] += (w * LAMP.wave(lamps, k)[0] * np.exp(1j * k * s) / s).sum() / LAMP.wave(p[None], k)[0][0]
+    np.testing.assert_allclose(factor(LAMP, BEHIND, ball, n=n, occlusion=False, **HUYGENS), expected, atol=1e-9)
 
 
 def test_the_report_is_brighter_where_the_mesh_is_finer(tmp_path):
@@ -205,6 +292,45 @@ def test_what_cannot_be_summed_is_refused(shapes, options: dict[str, Any], says)
 
 def test_nothing_in_the_light_sends_nothing():
     np.testing.assert_allclose(factor(LAMP, BEHIND, **HUYGENS), 1)
+
+
+@pytest.mark.parametrize("weights", ["report", "length", "kernel"])
+@pytest.mark.parametrize("place", [(0.3, 0, 0), (0, 0, 0)])
+def test_a_room_around_the_source_has_no_outline(place, weights):
+    room = {"type": "sphere", "radius": 10.0, "flip_normals": True, "bsdf": GREY}
+    points = np.array([[1, 2, 1], [0, 3, -2.0]])
+    m = factor(oracle.Spherical(place), points, room, weights=weights, diffraction="huygens")
+    np.testing.assert_allclose(m, 1, atol=1e-12)
+    np.testing.assert_allclose(factor(oracle.Spherical(place), points, room), 1, atol=1e-12)
+
+
+@pytest.mark.parametrize("weights", ["report", "length", "kernel"])
+@pytest.mark.parametrize("wavelength", [1e-12, 1e15])
+def test_any_wavelength_gives_numbers(wavelength, weights):
+    cube = shape("cube", affine(3))
+    m = factor(LAMP, BEHIND, cube, wavelength=wavelength, weights=weights, diffraction="huygens")
+    assert np.isfinite(m).all()
+
+
+def test_the_command_sums_sources_spaced_under_half_a_wavelength(tmp_path):
+    """`grimaldi field --diffraction huygens --n nyquist --weights kernel`: what the library returns."""
+    scene = {"type": "scene", "light": emitter(LAMP), "sheet": shape("rectangle", SQUARE)}
+    (tmp_path / "scene.xml").write_text(
+        '<scene version="3.0.0"><emitter type="coherent_point"><point name="position" x="3" y="-2" z="-40"/></emitter>'
+        '<shape type="rectangle"><transform name="to_world"><scale x="9" y="6"/></transform>'
+        '<bsdf type="twosided"><bsdf type="diffuse"/></bsdf></shape></scene>'
+    )
+    np.save(tmp_path / "points.npy", BEHIND)
+    asked = ["--diffraction", "huygens", "--n", "nyquist", "--weights", "kernel", "--wavelength", "1"]
+    done = subprocess.run(
+        [sys.executable, "-m", "grimaldi", "field", "scene.xml", "--points", "points.npy", "-o", "u.npz", *asked],
+        capture_output=True,
+        text=True,
+        cwd=tmp_path,
+    )
+    assert done.returncode == 0, done.stderr
+    ours = grimaldi.field(scene, BEHIND, wavelength=1, diffraction="huygens", n="nyquist", weights="kernel")
+    np.testing.assert_allclose(np.load(tmp_path / "u.npz")["U"], ours.U.values, rtol=1e-5)
 
 
 @pytest.mark.parametrize("n", [2, "nyquist"])
