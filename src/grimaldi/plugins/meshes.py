@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from grimaldi.errors import InputError
 from grimaldi.plugins import parameters
+from grimaldi.scene.triangles import as_mesh
 
 Reals = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -32,20 +33,13 @@ def register(V: Any) -> None:
 
 def _constructor(V: Any, name: str, read: Callable[[Any], tuple[Reals, Integers]]) -> Callable[[Any], Any]:
     def construct(props: Any) -> Any:
-        import mitsuba as mi
-
         vertices, faces = read(props)
         to_world = props.get("to_world", None)
         if to_world is not None:
             matrix = np.array(to_world.matrix, dtype=np.float64).reshape(4, 4)
             vertices = vertices @ matrix[:3, :3].T + matrix[:3, 3]
         smooth = not props.get("face_normals", name in ("cone", "stl"))
-        mesh = V.Mesh(props.id() or name, len(vertices), len(faces), has_vertex_normals=smooth, props=props)
-        values = mi.traverse(mesh)
-        values["vertex_positions"] = V.Float(vertices.astype(np.float32).ravel())
-        values["faces"] = V.UInt32(faces.astype(np.uint32).ravel())
-        values.update()
-        return mesh
+        return as_mesh(V, props.id() or name, vertices, faces, props, smooth=smooth)
 
     return construct
 

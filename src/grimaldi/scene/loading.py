@@ -31,8 +31,9 @@ def load(
     """A checked scene: its opaque bodies, holes and sources in Float64, and the Mitsuba scene itself.
 
     Args:
-        scene: path of a Mitsuba XML file; a Mitsuba scene dictionary; a `mi.Scene`; the name of a
-            built-in scene; or a `Scene`, which is returned as it is unless outlines or a unit are given.
+        scene: path of a Mitsuba XML file or of a pbrt file (.pbrt, version 3 or 4); a Mitsuba scene dictionary;
+            a `mi.Scene`; the name of a built-in scene; or a `Scene`, which is returned as it is unless outlines or a
+            unit are given.
         outlines: planar outlines to add, holes of the aperture screen or opaque masks.
         scene_unit: length of one scene unit, such as "1 um". Otherwise that of the scene itself: in XML
             `<string name="scene_unit" value="1 um"/>` directly in `<scene>`, in a dictionary the key
@@ -114,6 +115,8 @@ def _open(scene: Any) -> tuple[str, Any, str | None]:
     if not isinstance(scene, (str, Path)):
         return "scene", scene, None
     path = Path(scene)
+    if path.is_file() and path.suffix.lower() == ".pbrt":
+        return path.name, *_from_pbrt(path)
     if path.is_file():
         return path.name, *_from_file(path)
     return str(scene), *_from_dict(_builtin(str(scene)))
@@ -138,6 +141,16 @@ def _from_file(path: Path) -> tuple[Any, str | None]:
     config = _config()
     with _searching(path.parent), _mitsuba_errors():
         return _instantiate(config, mi.parser.parse_file(config, str(path)))
+
+
+def _from_pbrt(path: Path) -> tuple[Any, str | None]:
+    from grimaldi.scene import pbrt
+
+    scene, left_out = pbrt.read(path)
+    if left_out:
+        what = ", ".join(f"{name} (line {line})" for name, line in left_out.items())
+        warnings.warn(f"{path.name}: left out: {what}", GrimaldiWarning, stacklevel=5)
+    return _from_dict(scene)
 
 
 def _from_dict(scene: dict[str, Any]) -> tuple[Any, str | None]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -34,3 +36,38 @@ def check_positions(positions: NDArray[np.floating], place: str) -> None:
         i = int(np.flatnonzero(bad)[0])
         coordinates = ", ".join(f"{x:g}" for x in positions[i])
         raise InputError(f"{place}: vertex {i} is at ({coordinates}); give finite coordinates below {LARGEST:g}")
+
+
+def as_mesh(
+    V: Any,
+    name: str,
+    vertices: NDArray[np.floating],
+    faces: NDArray[np.integer],
+    props: Any,
+    *,
+    smooth: bool = False,
+    normals: NDArray[np.floating] | None = None,
+    uv: NDArray[np.floating] | None = None,
+) -> Any:
+    """A Mitsuba mesh of the variant module V, with the BSDF, emitter and flags in `props` (`mi.Properties`).
+
+    vertices (n, 3) in world space, faces (m, 3), normals (n, 3), uv (n, 2); `smooth` makes normals from the faces.
+    """
+    import mitsuba as mi
+
+    mesh = V.Mesh(
+        name,
+        len(vertices),
+        len(faces),
+        props=props,
+        has_vertex_normals=smooth or normals is not None,
+        has_vertex_texcoords=uv is not None,
+    )
+    values = mi.traverse(mesh)
+    given = {"vertex_positions": vertices, "vertex_normals": normals, "vertex_texcoords": uv}
+    for key, array in given.items():
+        if array is not None:
+            values[key] = V.Float(array.astype(np.float32).ravel())
+    values["faces"] = V.UInt32(faces.astype(np.uint32).ravel())
+    values.update()
+    return mesh
