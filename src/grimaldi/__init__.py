@@ -1,8 +1,8 @@
 """Grimaldi: waves for Mitsuba 3.
 
 `import grimaldi` suffices, before or after Mitsuba: it registers its plugins (integrator `wave`, emitters
-`coherent_point` and `coherent_directional`, BSDF `aperture`) for every variant, and costs nothing until
-one of the names below is used.
+`coherent_point`, `coherent_directional` and `coherent_area`, BSDF `aperture`, some shapes) for every variant, and costs
+nothing until one of the names below is used.
 """
 
 from __future__ import annotations

@@ -13,7 +13,8 @@ from grimaldi.errors import InputError
 Scene = Annotated[
     str,
     typer.Argument(
-        help="A Mitsuba scene file (.xml), or a built-in scene: young, slit, arago, knife-edge, creature.",
+        help="A scene file of Mitsuba (.xml) or pbrt (.pbrt), or a built-in scene: young, slit, arago, knife-edge, "
+        "creature.",
         show_default=False,
     ),
 ]

@@ -30,7 +30,8 @@ def register(V: Any) -> None:
 
          * - diffraction
            - |string|
-           - "boundary", Kirchhoff's integral along the outlines, or "none". (Default: "boundary")
+           - "boundary", Kirchhoff's integral along the outlines; "huygens", sources along silhouettes; "area", brute
+             force; or "none", rays. (Default: "boundary")
 
          * - interference
            - |bool|
