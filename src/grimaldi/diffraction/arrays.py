@@ -22,7 +22,21 @@ class Types(NamedTuple):
     def buffer(self, values: NDArray[Any]) -> Any:
         """Numbers as one flat device buffer."""
         dtype = np.float64 if dr.itemsize_v(self.Float) == 8 else np.float32
-        return self.Float(np.ascontiguousarray(values, dtype).ravel())
+        return self.Float(_aligned(np.asarray(values, dtype).ravel()))
+
+
+def _aligned(values: NDArray[Any]) -> NDArray[Any]:
+    """A copy at a multiple of 128: Dr.Jit reads NumPy's memory in place, and compiles its alignment into kernels."""
+    room = np.empty(values.nbytes + 128, np.uint8)
+    first = -room.ctypes.data % 128
+    copy = room[first : first + values.nbytes].view(values.dtype)
+    copy[:] = values
+    return copy
+
+
+def on_device(kind: Any, number: float) -> Any:
+    """A number as a Dr.Jit array that no kernel contains: other scenes and wavelengths run what is compiled already."""
+    return dr.opaque(kind, number)
 
 
 def types(double: bool) -> Types:

@@ -6,15 +6,15 @@ wave is `segment.segment_wave`, the sums over outlines are in `edges`.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import drjit as dr
 import numpy as np
 
 from grimaldi.diffraction import none
-from grimaldi.diffraction.arrays import types
-from grimaldi.diffraction.edges import Sum, body_sum, lit_share, planar_sum
-from grimaldi.diffraction.frame import frame
+from grimaldi.diffraction.arrays import Types, types
+from grimaldi.diffraction.edges import Margins, Sum, body_sum, lit_share, planar_sum
+from grimaldi.diffraction.frame import Frame, frame
 from grimaldi.diffraction.model import Evaluate, Factor, Options, Receivers
 from grimaldi.diffraction.occlusion import rays
 from grimaldi.diffraction.screen import beyond
@@ -26,57 +26,109 @@ from grimaldi.scene.model import Scene, Source
 HIDDEN_END = 0.5  # of the tolerance: what an untested X→P may at most leave behind
 
 
+class Problem(NamedTuple):
+    """One source's light and how finely it is asked, shared by both precisions."""
+
+    scene: Scene
+    source: Source
+    outline: Outline
+    k: float
+    options: Options
+
+
 def boundary(scene: Scene, source: Source, outline: Outline, k: float, options: Options) -> Evaluate:
     """The `boundary` model for one source: M by eq. 4 behind holes, by eq. 5 past bodies and masks.
+
+    Where Float32 sums may serve, they are done first; receivers whose estimated error is above the tolerance, as
+    beside an edge, are done again in Float64.
 
     Raises InputError in variants without vectorised arrays.
     """
     if len(outline) == 0:
         return none.none(scene, source, outline, k, options)
-    tab = table(outline, types(needs_double(outline, k, options)))
-    rule = Rule.of(options.tolerance)
-    if scene.screen:
-        return _planar(scene, source, tab, k, rule)
-    return _bodies(scene, source, tab, outline.sag, k, rule, options)
+    problem = Problem(scene, source, outline, k, options)
+    of_kind = _planar if scene.screen else _bodies
+    double = of_kind(problem, types(double=True))
+    if needs_double(outline, k, options):
+        return double
+    single = of_kind(problem, types(double=False))
+    return lambda receivers: _in_either(single, double, options.tolerance, receivers)
 
 
-def _factor(tab: Table, rule: Rule, geometric: Any, sign: int, sums: Sum) -> Factor:
-    """M = geometric ± (1/2π) sum, and what is known of its error: series, panels, rounding."""
+@dr.syntax
+def _in_either(single: Evaluate, double: Evaluate, tolerance: float, receivers: Receivers) -> Factor:
+    """Float32 first, and Float64 where that is not within the tolerance."""
+    F = types(double=True).Float
+    m = single(receivers)
+    real, imag, error = F(m.real), F(m.imag), F(m.error)
+    again = receivers.active & (error > tolerance)
+    if again:
+        finer = double(Receivers(receivers.p, receivers.n, again))
+        real, imag, error = F(finer.real), F(finer.imag), F(finer.error)
+    return Factor(real, imag, error)
+
+
+def _factor(
+    tab: Table, rule: Rule, fr: Frame, k: float, margins: Margins, geometric: Any, sign: int, sums: Sum
+) -> Factor:
+    """M = geometric ± (1/2π) sum, and what is known of its error: tails, panels, rounding."""
     scale = sign / (2 * np.pi)
-    rounding = 2e-15 if dr.itemsize_v(tab.types.Float) == 8 else 5e-7
-    series = dr.sqrt(sums.err_real * sums.err_real + sums.err_imag * sums.err_imag) / np.pi
-    return Factor(geometric + scale * sums.real, scale * sums.imag, series + (rule.share + rounding))
+    tails = dr.sqrt(sums.err_real * sums.err_real + sums.err_imag * sums.err_imag) / np.pi
+    error = tails + (rule.share + _rounding(tab, fr, k, margins))
+    return Factor(geometric + scale * sums.real, scale * sums.imag, error)
 
 
-def _planar(scene: Scene, source: Source, tab: Table, k: float, rule: Rule) -> Evaluate:
+def _rounding(tab: Table, fr: Frame, k: float, margins: Margins) -> Any:
+    """What rounded coordinates do to M.
+
+    They shift edges: M changes by as much as over that way across the rim (eq. 8), or, a few λ from S or P, by the
+    angle that it subtends there. Through a corner in Float32 the edges that meet there may disagree: all bets are off.
+    """
+    F = tab.types.Float
+    shift = dr.epsilon(F) * (10 * fr.lever + tab.device(tab.reach))
+    near = dr.rsqrt(dr.maximum(margins.receiver2, 1e-30)) + dr.rcp(tab.device(tab.from_source))
+    error = 4 * dr.epsilon(F) + 2 * shift * (dr.sqrt(near * tab.device(k / (2 * np.pi))) + near / np.pi)
+    if dr.itemsize_v(F) == 8:
+        return error
+    return dr.select(margins.ray2 > dr.square(100 * shift), error, 1)
+
+
+def _planar(problem: Problem, precision: Types) -> Evaluate:
     """Coplanar holes in a screen, or masks; M = 1 on the source's own side."""
-    hole = scene.screen[0].hole
-    far = beyond(scene.screen[0], source)
+    screen, source = problem.scene.screen[0], problem.source
+    tab = table(problem.outline, source, precision)
+    rule, k = Rule.of(problem.options.tolerance), problem.k
+    far = beyond(screen, source)
 
     def evaluate(receivers: Receivers) -> Factor:
         shaded = receivers.active & far(receivers.p)
-        fr = frame(source, receivers.p, tab)
-        sums, n = planar_sum(fr, tab, k, rule, shaded)
-        m = _factor(tab, rule, n, -1, sums) if hole else _factor(tab, rule, 1 - n, 1, sums)
+        fr = frame(source, receivers.p, tab, screen)
+        sums, n, margins = planar_sum(fr, tab, tab.device(k), rule, shaded)
+        geometric, sign = (n, -1) if screen.hole else (1 - n, 1)
+        m = _factor(tab, rule, fr, k, margins, geometric, sign, sums)
         return Factor(dr.select(shaded, m.real, 1), dr.select(shaded, m.imag, 0), dr.select(shaded, m.error, 0))
 
     return evaluate
 
 
-def _bodies(scene: Scene, source: Source, tab: Table, sag: float, k: float, rule: Rule, options: Options) -> Evaluate:
-    probe = rays(scene, source, sag)
+def _bodies(problem: Problem, precision: Types) -> Evaluate:
+    source, options = problem.source, problem.options
+    tab = table(problem.outline, source, precision)
+    rule, k = Rule.of(options.tolerance), problem.k
+    probe = rays(problem.scene, source, problem.outline.sag)
 
     def evaluate(receivers: Receivers) -> Factor:
         fr = frame(source, receivers.p, tab)
-        sums, nearest = body_sum(
+        sums, nearest, margins = body_sum(
             fr,
             tab,
-            k,
+            tab.device(k),
             rule,
             HIDDEN_END * options.tolerance,
             probe if options.occlusion else None,
             receivers,
         )
-        return _factor(tab, rule, lit_share(fr, tab, nearest, probe, receivers), 1, sums)
+        lit = lit_share(fr, tab, nearest, probe, receivers)
+        return _factor(tab, rule, fr, k, margins, lit, 1, sums)
 
     return evaluate

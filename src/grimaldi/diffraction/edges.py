@@ -11,10 +11,11 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from grimaldi.diffraction.arrays import on_device
 from grimaldi.diffraction.frame import Frame, constant
 from grimaldi.diffraction.model import Receivers
 from grimaldi.diffraction.occlusion import Rays
-from grimaldi.diffraction.segment import Line, Rule, detour, line, segment_wave, stationary
+from grimaldi.diffraction.segment import Line, Rule, growth, line, path, segment_wave
 from grimaldi.diffraction.table import Piece, Segment, Table
 
 
@@ -33,6 +34,20 @@ class Nearest(NamedTuple):
     distance2: Any
     segment: Any
     piece: Any
+
+
+class Margins(NamedTuple):
+    """Squared distances of the ray S→P, and of P itself, to the outline nearest to each."""
+
+    ray2: Any
+    receiver2: Any
+
+
+def to_receiver(fr: Frame, seg: Segment, ln: Line) -> Any:
+    """Squared distance of P to a segment."""
+    h = ln.h - fr.z2
+    t = dr.clip(ln.eqq * ln.td - h * ln.ea, 0, seg.length)
+    return dr.squared_norm(ln.q0 + t * ln.eq) + dr.square(h + t * ln.ea)
 
 
 def _basis(a: Any) -> tuple[Any, Any]:
@@ -62,19 +77,24 @@ def _turn(frame: Frame, seg: Segment, across: Any, kappa: Any) -> tuple[Any, Any
 
 
 @dr.syntax
-def planar_sum(fr: Frame, tab: Table, k: float, rule: Rule, active: Any) -> tuple[Sum, Any]:
+def planar_sum(fr: Frame, tab: Table, k: Any, rule: Rule, active: Any) -> tuple[Sum, Any, Margins]:
     """The sum over whole planar loops, nothing in between, and n = (1/2π)∮dφ as an exact count."""
     F = tab.types.Float
     real, imag, err_real, err_imag = F(0), F(0), F(0), F(0)
+    ray2, receiver2 = F(dr.inf), F(dr.inf)
     n, j = F(0), dr.uint32_array_t(F)(0)
     _, across = _basis(fr.a)
     while active & (j < tab.size):
         seg = tab.segment(j)
-        re, im, er, ei, kappa = segment_wave(fr, seg.X0, seg.e, seg.length, k, rule, active)
-        n += _turn(fr, seg, across, kappa)[0]
-        real, imag, err_real, err_imag = real + re, imag + im, err_real + er, err_imag + ei
+        ln = line(fr, seg.X0, seg.e)
+        wave = segment_wave(fr, ln, seg.length, k, rule, active)
+        n += _turn(fr, seg, across, ln.kappa)[0]
+        real, imag = real + wave.real, imag + wave.imag
+        err_real, err_imag = err_real + wave.err_real, err_imag + wave.err_imag
+        ray2 = dr.minimum(ray2, closest(fr, seg, ln))
+        receiver2 = dr.minimum(receiver2, to_receiver(fr, seg, ln))
         j += 1
-    return Sum(real, imag, err_real, err_imag), n
+    return Sum(real, imag, err_real, err_imag), n, Margins(ray2, receiver2)
 
 
 @dr.syntax
@@ -108,16 +128,14 @@ def sounds(fr: Frame, piece: Piece, n: Any) -> Any:
     return above & behind
 
 
-def _matters(fr: Frame, piece: Piece, e: Any, k: float, share: float) -> Any:
+def _matters(fr: Frame, piece: Piece, e: Any, k: Any, share: float) -> Any:
     """Whether the chain's wave, cut off somewhere on this piece, would exceed `share` of M.
 
     The end of a chain sends |M| = √D / (4π (D + w) √w), D = kΔs at the stationary point, w = k(Δ - Δs).
     """
-    ln = line(fr, piece.middle, e)
-    st = stationary(fr, ln, (e - ln.ea * fr.a, ln.q0))
-    D, _, _, _ = detour(fr, ln, st.t, ln.eqq * (dr.square(st.t - ln.td) + ln.w * ln.w))
-    D = dr.maximum(k * D, 0.01)
-    w = dr.maximum(k * st.growth(dr.maximum(dr.abs(st.t) - piece.reach, 0)), 0.1)
+    st = path(fr, line(fr, piece.middle, e), k)
+    D = dr.maximum(st.A, 0.01)
+    w = dr.maximum(growth(fr, st, dr.copysign(dr.maximum(dr.abs(st.t) - piece.reach, 0), -st.t), k), 0.1)
     return dr.sqrt(D) > 4 * np.pi * share * (D + w) * dr.sqrt(w)
 
 
@@ -133,8 +151,8 @@ def closest(fr: Frame, seg: Segment, ln: Line) -> Any:
 
 @dr.syntax
 def body_sum(
-    fr: Frame, tab: Table, k: float, rule: Rule, share: float, probe: Rays | None, receivers: Receivers
-) -> tuple[Sum, Nearest]:
+    fr: Frame, tab: Table, k: Any, rule: Rule, share: float, probe: Rays | None, receivers: Receivers
+) -> tuple[Sum, Nearest, Margins]:
     """The sum over the outlines of bodies, piece by piece, each only where it reaches the receiver."""
     F = tab.types.Float
     U = dr.uint32_array_t(F)
@@ -145,6 +163,7 @@ def body_sum(
         p = p + probe.epsilon(p) * receivers.n  # off its own surface
     real, imag, err_real, err_imag = F(0), F(0), F(0), F(0)
     nearest2, nearest_segment, nearest_piece = F(dr.inf), U(0), U(0)
+    receiver2 = F(dr.inf)
     i = U(0)
     while receivers.active & (i < tab.n_pieces):
         piece = tab.piece(i)
@@ -158,16 +177,20 @@ def body_sum(
         j = U(piece.first)
         while acts & (j < piece.end):
             seg = tab.segment(j)
-            re, im, er, ei, _ = segment_wave(fr, seg.X0, seg.e, seg.length, k, rule, acts)
-            real, imag, err_real, err_imag = real + re, imag + im, err_real + er, err_imag + ei
-            d2 = closest(fr, seg, line(fr, seg.X0, seg.e))
+            ln = line(fr, seg.X0, seg.e)
+            wave = segment_wave(fr, ln, seg.length, k, rule, acts)
+            real, imag = real + wave.real, imag + wave.imag
+            err_real, err_imag = err_real + wave.err_real, err_imag + wave.err_imag
+            receiver2 = dr.minimum(receiver2, to_receiver(fr, seg, ln))
+            d2 = closest(fr, seg, ln)
             closer = d2 < nearest2
             nearest2 = dr.select(closer, d2, nearest2)
             nearest_segment = dr.select(closer, j, nearest_segment)
             nearest_piece = dr.select(closer, i, nearest_piece)
             j += 1
         i += 1
-    return Sum(real, imag, err_real, err_imag), Nearest(nearest2, nearest_segment, nearest_piece)
+    nearest = Nearest(nearest2, nearest_segment, nearest_piece)
+    return Sum(real, imag, err_real, err_imag), nearest, Margins(nearest2, receiver2)
 
 
 @dr.syntax
@@ -212,7 +235,7 @@ def lit_share(fr: Frame, tab: Table, nearest: Nearest, probe: Rays, receivers: R
     p = mi.Point3f(receivers.p)
     epsilon = probe.epsilon(p)
     p = p + epsilon * receivers.n
-    rim = F(4 * epsilon + 2 * probe.sag)
+    rim = F(4 * epsilon + 2 * on_device(mi.Float, probe.sag))
     lit = dr.select(probe.lit(p, receivers.active), F(1), F(0))
     near = receivers.active & (nearest.distance2 < rim * rim)
     if near:

@@ -8,12 +8,14 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from grimaldi.diffraction.arrays import types
+from grimaldi.diffraction.arrays import on_device, types
 from grimaldi.scene.model import Source, Spot, Vector
+from grimaldi.scene.planar import PlanarOutline
 
 if TYPE_CHECKING:
     from grimaldi.diffraction.table import Table
 
+ROUNDINGS = 32  # by which a ray is moved aside: what edges that meet in a corner may differ in
 ASIDE = (0.36161, 0.48757, 0.79467)  # no direction in which people place corners
 
 
@@ -24,41 +26,53 @@ class Frame(NamedTuple):
     foot: Any  # foot of the outlines' centre on the ray, relative to the centre
     z1: Any  # along the ray from S to the foot; unused for a plane wave
     z2: Any  # from the foot to P
+    lever: Any  # what its rounding is relative to
     plane: bool
 
 
 def constant(Vector3: Any, v: Vector) -> Any:
-    """A NumPy vector as a Dr.Jit one."""
-    return Vector3(*(float(x) for x in v))
+    """A NumPy vector as a Dr.Jit one, no part of the kernel: another scene runs the same."""
+    return Vector3(*(on_device(dr.value_t(Vector3), float(x)) for x in v))
 
 
-def frame(source: Source, p: Any, table: Table) -> Frame:
+def frame(source: Source, p: Any, table: Table, screen: PlanarOutline | None = None) -> Frame:
     """The frame of every ray source → p (Float64), about the outlines' centre, in the precision of their table.
+
+    screen: where all outlines lie in one plane, one of them: nothing is then nearer to the ray than that plane.
 
     The cancellation q = X - S - z1 a is done here, against the foot of the centre on the ray, so that Float32
     coordinates stay small however far S and P are (THEORY 2, "Consequences"). The ray is moved aside by what
     rounding leaves open: through a corner exactly, the edges that meet there could not agree on its side.
     """
     V, out = types(double=True).Vector, table.types
-    c = constant(V, table.centre)
+    c, reach = constant(V, table.centre), on_device(dr.value_t(V), table.reach)
     if source.is_plane:
         assert source.direction is not None
         a = constant(V, source.direction)
         z1 = type(p.x)(0)
         z2 = dr.dot(p - c, a)
-        foot = p - z2 * a - c
+        z2 = dr.select(dr.abs(z2) < reach, 0, z2)  # beside P count from P itself
+        foot = p - c - z2 * a
     else:
         assert source.position is not None
         s = constant(V, source.position)
         d = p - s
         distance = dr.norm(d)
         a = d / distance
-        z1 = dr.dot(c - s, a)
+        z2 = dr.dot(p - c, a)
+        z2 = dr.select(dr.abs(z2) < reach, 0, z2)  # beside P count from P itself
+        z1 = distance - z2
+        z1 = dr.select(dr.abs(z1) < reach, 0, z1)  # and beside S from there
         z2 = distance - z1
-        foot = s - c + z1 * a
-    aside = constant(V, (1e-12 if dr.itemsize_v(out.Float) == 8 else 5e-7) * np.array(ASIDE))
-    foot += (table.reach + dr.norm(foot)) * (aside - dr.dot(aside, a) * a)
-    return Frame(out.Vector(a), out.Vector(foot), out.Float(z1), out.Float(z2), source.is_plane)
+        foot = dr.select(z1 == 0, s - c, p - c - z2 * a)
+    lever = reach + dr.norm(foot)
+    if screen is not None and dr.itemsize_v(out.Float) == 8:
+        normal = constant(V, screen.normal)
+        along = dr.dot(p - constant(V, screen.origin), normal) / dr.dot(a, normal)
+        lever = dr.minimum(lever, dr.abs(along))
+    aside = constant(V, ROUNDINGS * dr.epsilon(out.Float) * np.array(ASIDE))
+    foot += lever * (aside - dr.dot(aside, a) * a)
+    return Frame(out.Vector(a), out.Vector(foot), out.Float(z1), out.Float(z2), out.Float(lever), source.is_plane)
 
 
 def incident(source: Source, p: Any, k: float) -> tuple[Any, Any, Any]:
@@ -67,16 +81,16 @@ def incident(source: Source, p: Any, k: float) -> tuple[Any, Any, Any]:
     if source.is_plane:
         assert source.direction is not None
         path = dr.dot(p - constant(V, source.origin), constant(V, source.direction))
-        modulus = type(path)(source.amplitude)
+        modulus = on_device(type(path), source.amplitude)
     else:
         assert source.position is not None
         d = p - constant(V, source.position)
         path = dr.norm(d)
-        modulus = source.amplitude / path
+        modulus = on_device(type(path), source.amplitude) / path
         if source.spot is not None:
             modulus *= dr.sqrt(profile(source.spot, d / path))
-    turns = path * (k / (2 * np.pi))
-    phase = 2 * np.pi * (turns - dr.round(turns)) + source.phase
+    turns = path * on_device(type(path), k / (2 * np.pi))
+    phase = 2 * np.pi * (turns - dr.round(turns)) + on_device(type(path), source.phase)
     sin, cos = dr.sincos(phase)
     return modulus, cos, sin
 

@@ -79,7 +79,7 @@ def huygens(scene: Scene, source: Source, outline: Outline, k: float, options: O
     if len(outline) == 0:
         return geometric
     sources = divided(outline, _parts(outline, k, options))
-    tab = table(sources, types(needs_double(outline, k, options)), np.arange(len(sources) + 1))
+    tab = table(sources, source, types(needs_double(outline, k, options)), np.arange(len(sources) + 1))
     lengths = np.linalg.norm(sources.end - sources.start, axis=1)
     if options.weights == "report":
         lengths = _shared(lengths, sources.body)

@@ -53,7 +53,7 @@ def _lit(scene: Scene, source: Source, receivers: Receivers) -> Any:
 
 
 def _planar(scene: Scene, source: Source, outline: Outline) -> Evaluate:
-    tab = table(outline, types(double=True))
+    tab = table(outline, source, types(double=True))
     far = beyond(scene.screen[0], source)
 
     def evaluate(receivers: Receivers) -> Factor:

@@ -9,6 +9,7 @@ import drjit as dr
 import mitsuba
 import numpy as np
 
+from grimaldi.diffraction.arrays import on_device
 from grimaldi.diffraction.frame import constant, toward
 from grimaldi.diffraction.table import Piece
 from grimaldi.scene.model import Mesh, Scene, Source, Sphere
@@ -28,7 +29,7 @@ class Rays(NamedTuple):
 
     def epsilon(self, p: Any) -> Any:
         """What Float32 coordinates on a ray from p cannot tell apart, with room [scene units]."""
-        return 4e-6 * dr.maximum(dr.max(dr.abs(p)), self.extent)
+        return 4e-6 * dr.maximum(dr.max(dr.abs(p)), on_device(mi.Float, self.extent))
 
     def clear(self, origin: Any, target: Any, active: Any) -> Any:
         """Whether nothing stands on origin→target."""
@@ -57,7 +58,7 @@ class Rays(NamedTuple):
         epsilon = self.epsilon(p)
         depth = dr.minimum(dr.dot(piece.lit, d), dr.dot(piece.dark, d))  # sine of the angle below the faces at x
         # the body's own surface at x: what lies across the ray counts the more along it the more it grazes
-        across = 2 * self.sag + 0.25 * epsilon
+        across = 2 * on_device(mi.Float, self.sag) + 0.25 * epsilon
         margin = dr.minimum(4 * epsilon + across / dr.maximum(dr.abs(depth), GRAZING), 0.5 * length)
         end = length - margin
         hit = self.blockers.ray_intersect_preliminary(

@@ -1,14 +1,15 @@
-"""The boundary wave of one straight outline segment: ∫ C e^{ikΔ} dφ (THEORY eq. 4-7), at a cost free of λ.
+"""The boundary wave of one straight outline segment, ∫ C e^{ikΔ} dφ (THEORY eq. 7), at a cost free of λ.
 
-A segment X(t) = X0 + t e is cut at most three ways. Around its stationary point (Δ' = 0) and the foot of
-the ray, Gauss-Legendre panels in v, with t - t_d = w sinh v, so that dφ = ±dv/cosh v however close the rim
-is. Beyond a phase distance K from the stationary point, the ends' asymptotic series alone, whose third term
-comes from the integrand's two known poles:
+Along the segment's line the path length σ = r + s grows on both sides of a stationary point, where it is σs. By
+Y = k(σ - σs) each side is an integral without any reference to the line (THEORY eq. 9):
 
-    ∫ f e^{ikΔ} dt = B(t1) - B(t0),   B = (g/k) e^{ikΔ} (-i + ρ + i ρ₂),   f = C κ/d²,   g = f/Δ'
-    ρ = L/k,   L = (f'/f - Δ''/Δ')/Δ',   ρ₂ = ρ² + 2 (ρ + 1/kΔ)² + 1/(kΔ)²
+    sgn κ e^{iA} ∫ √A F(Y) e^{iY} dY / (2 √Y (Y + A)),      A = k(σs - R),
+    F = sin(ψ/2) · 2R/(R + σs + Y/k) · √( kb/(kb + Y) · (σs + R)/(2σs + Y/k) · (σs + σm)/(σs + σm + Y/k) )
 
-ρ₂ is exact in the paraxial limit, where g ~ w^{-1/2} (Δs+w)^{-1} with w = Δ - Δs.
+ψ is the angle between the half planes from the line to S and to P, σm the path that the same S and P would have on
+one side of the line, b = σs - σm >= A/k. All singularities lie at Y <= 0. So Y = A sinh² v makes the integrand analytic
+for |Im v| < π/2 whatever the geometry, on the rim and beside S and P too: Gauss-Legendre panels of one width serve
+there. Beyond Y = K the path turns off to Y + iτ, where Gauss-Laguerre with few nodes serves all.
 """
 
 from __future__ import annotations
@@ -22,30 +23,54 @@ from grimaldi.diffraction.frame import Frame
 
 
 class Rule(NamedTuple):
-    """How finely a segment is integrated for a tolerance: eq. numbers in the module's docstring.
+    """How finely a segment is integrated for a tolerance.
 
-    K [rad] is where the asymptotic series takes over; a panel has `nodes`, `weights` on 0..1 and spans at
-    most `phase` radians of kΔ and `stretch` in v; `share` is the error that one end may add to M.
+    Up to Y = K by panels of width `stretch` in v with `nodes`, `weights` on 0..1, up to v = `cut`, beyond which nothing
+    is left; beyond K by `tail_nodes`, `tail_weights` on 0..∞, to the relative error `tail_error` at K or less. `share`
+    is the error that panels may add to M.
     """
 
     K: float
-    phase: float
     stretch: float
     nodes: tuple[float, ...]
     weights: tuple[float, ...]
+    tail_nodes: tuple[float, ...]
+    tail_weights: tuple[float, ...]
+    tail_error: float
+    cut: float
     share: float
 
     @staticmethod
     def of(tolerance: float) -> Rule:
+        """The cheapest of the measured rules whose errors are within a twentieth of the tolerance."""
+        K, n, stretch, tails, error = next(rule for least, *rule in RULES if tolerance >= least)
+        x, w = np.polynomial.legendre.leggauss(int(n))
+        tail_x, tail_w = np.polynomial.laguerre.laggauss(int(tails))
         share = 0.1 * tolerance
-        K = max(10.0, 1.5 * (0.5 / share) ** 0.25)  # the series' next term is about 0.5 K⁻⁴; ends add up
-        n, phase, stretch = 4, 3.0, 1.5
-        if tolerance < 5e-4:
-            n, phase, stretch = 8, 4.0, 1.5
-        if tolerance < 1e-6:
-            n, phase, stretch = 16, 8.0, 1.6
-        x, w = np.polynomial.legendre.leggauss(n)
-        return Rule(K, phase, stretch, tuple((0.5 * (x + 1)).tolist()), tuple((0.5 * w).tolist()), share)
+        return Rule(
+            K,
+            stretch,
+            tuple((0.5 * (x + 1)).tolist()),
+            tuple((0.5 * w).tolist()),
+            tuple(tail_x.tolist()),
+            tuple(tail_w.tolist()),
+            error,
+            float(np.log(100 / tolerance)),
+            share,
+        )
+
+
+# Least tolerance, K, nodes a panel, its width, nodes of a tail, error of a tail relative to it at K: the largest over
+# random geometries (benchmarks/segment_rules.py).
+RULES = (
+    (5e-3, 3.0, 4, 1.2, 2, 2e-3),
+    (5e-4, 4.0, 5, 1.2, 3, 2e-4),
+    (5e-5, 5.0, 8, 1.4, 4, 2e-5),
+    (5e-7, 6.0, 10, 1.0, 6, 4e-7),
+    (5e-9, 8.0, 14, 1.0, 8, 2e-9),
+    (5e-11, 8.0, 16, 1.0, 12, 2e-11),
+    (0.0, 12.0, 20, 1.0, 14, 1e-13),
+)
 
 
 class Line(NamedTuple):
@@ -54,6 +79,7 @@ class Line(NamedTuple):
     q0: Any
     h: Any  # along the ray, from the foot to X0
     ea: Any
+    eq: Any  # e - (e·a) a
     eqq: Any
     td: Any
     w: Any
@@ -72,7 +98,7 @@ def line(frame: Frame, X0: Any, e: Any) -> Line:
     td = -dr.dot(q0, eq) / eqq
     # on the rim itself w is 0: keep it above the rounding of t, far below what any tolerance sees
     w = dr.maximum(dr.abs(kappa) / eqq, 8 * dr.epsilon(kappa) * (dr.abs(td) + dr.norm(q0)) + 1e-30)
-    return Line(q0, h, ea, eqq, td, w, kappa)
+    return Line(q0, h, ea, eq, eqq, td, w, kappa)
 
 
 def detour(frame: Frame, ln: Line, t: Any, d2: Any) -> tuple[Any, Any, Any, Any]:
@@ -90,75 +116,102 @@ def detour(frame: Frame, ln: Line, t: Any, d2: Any) -> tuple[Any, Any, Any, Any]
     return delta, 0.5 + 0.5 * (z1 * z2 - d2) * inv_r * inv_s, inv_r, inv_s
 
 
-def end_wave(frame: Frame, ln: Line, t: Any, k: float) -> tuple[Any, Any, Any, Any, Any]:
-    """B(t) (real, imaginary), the series' next term (real, imaginary) and kΔ'."""
-    u = t - ln.td
-    b = ln.eqq * u  # q·eq
-    d2 = ln.eqq * dr.fma(u, u, ln.w * ln.w)
-    delta, C, inv_r, inv_s = detour(frame, ln, t, d2)
-    ds = (b - (frame.z2 - ln.h - t * ln.ea) * ln.ea) * inv_s
-    dd = (1 - ds * ds) * inv_s
-    cos = 2 * C - 1
-    if frame.plane:
-        dr_ = ln.ea
-        dcos = -(dr_ + cos * ds) * inv_s
-    else:
-        dr_ = ((frame.z1 + ln.h + t * ln.ea) * ln.ea + b) * inv_r
-        dd += (1 - dr_ * dr_) * inv_r
-        dcos = -(ds + cos * dr_) * inv_r - (dr_ + cos * ds) * inv_s
-    slope = dr_ + ds
-    slope = dr.select(dr.abs(slope) > 1e-30, slope, 1e-30)
-    g = C * ln.kappa / (d2 * slope * k)
-    rho = (0.5 * dcos / dr.maximum(C, 1e-12) - 2 * b / d2 - dd / slope) / (slope * k)
-    pole = 1 / (k * delta)
-    rho2 = rho * rho + 2 * dr.square(rho + pole) + pole * pole
-    sin, cos_ = sincos(k * delta)
-    real, imag = g * rho, g * (rho2 - 1)
-    last = 5 * g * rho * rho2  # |g₃/g₀| is 4 to 5 ρ ρ₂ between the two limits
-    return (
-        real * cos_ - imag * sin,
-        real * sin + imag * cos_,
-        last * cos_,
-        last * sin,
-        slope * k,
-    )
+class Path(NamedTuple):
+    """How the path length grows along a line on both sides of its stationary point, in units of 1/k.
+
+    A and B are kΔ and k(σ - σm) there; u1, u2, u3 are 1/(R + σs), 1/2σs, 1/(σs + σm), 0 for a plane wave; `front` is
+    F at Y = 0.
+    """
+
+    t: Any  # the stationary point
+    r0: Any  # r and s there, and the line's share of the way: cosine and sine of its angle with the unfolded path
+    s0: Any
+    cos: Any
+    sin: Any
+    A: Any
+    B: Any
+    u1: Any
+    u2: Any
+    u3: Any
+    front: Any
 
 
-class Stationary(NamedTuple):
-    """The stationary point t_s of Δ along a line and 1/Δ'' there (r+s is convex: there is one)."""
-
-    t: Any
-    radius: Any
-
-    def reach(self, y: Any) -> Any:
-        """How far from t_s Δ has grown by y at the latest."""
-        return dr.sqrt(y * (y + 2 * self.radius))
-
-    def growth(self, x: Any) -> Any:
-        """Inverse of `reach`."""
-        return x * x / (self.radius + dr.sqrt(dr.fma(self.radius, self.radius, x * x)))
-
-
-def stationary(frame: Frame, ln: Line, eq_q0: tuple[Any, Any]) -> Stationary:
+def path(frame: Frame, ln: Line, k: Any) -> Path:
     """By unfolding S and P into one plane through the line, at distances ρ1 and ρ2 from it."""
-    eq, q0 = eq_q0
+    Float = type(ln.w)
+    tiny = 1e-30
     z2 = frame.z2 - ln.h
     b0 = -ln.eqq * ln.td
     k2 = ln.kappa * ln.kappa
-    rho2 = dr.sqrt(dr.squared_norm(z2 * eq + ln.ea * q0) + k2)
+    c2 = ln.ea * ln.ea * dr.squared_norm(ln.q0) + k2
+    m2 = -z2 * ln.eq - ln.ea * ln.q0
+    rho2 = dr.maximum(dr.sqrt(dr.squared_norm(m2) + k2), tiny)
     t2 = z2 * ln.ea - b0
     if frame.plane:
-        sin = dr.sqrt(ln.eqq)
-        return Stationary(t2 - ln.ea * rho2 / sin, rho2 / (sin * ln.eqq))
+        sine = dr.sqrt(ln.eqq)
+        cos_psi = dr.dot(ln.eq, m2) / (sine * rho2)
+        sin_psi = dr.abs(ln.kappa) / (sine * rho2)
+        s0 = rho2 / sine
+        b = 2 * rho2 * sine
+        cos2, sin_half = _half(cos_psi, sin_psi)
+        zero = Float(0)
+        # t2 - (e·a) s0, where z2 is large, without that difference
+        lever = -(2 * z2 * ln.ea * b0 + c2) / (ln.eqq * (z2 + s0))
+        t = dr.select(z2 > 0, ln.ea * lever - b0, t2 - ln.ea * s0)
+        return Path(t, zero, s0, ln.ea, sine, k * b * cos2 + tiny, k * b, zero, zero, zero, sin_half)
     z1 = frame.z1 + ln.h
-    rho1 = dr.sqrt(dr.squared_norm(z1 * eq - ln.ea * q0) + k2)
+    R = frame.z1 + frame.z2
+    m1 = z1 * ln.eq - ln.ea * ln.q0
+    rho1 = dr.maximum(dr.sqrt(dr.squared_norm(m1) + k2), tiny)
     t1 = -(z1 * ln.ea + b0)
     total = rho1 + rho2
-    path = dr.sqrt(total * total + dr.square(t1 - t2))
-    sin2 = dr.square(total / path)
-    share = rho2 / total
-    # r and s there are path·ρ1/total and path·ρ2/total
-    return Stationary(t2 + (t1 - t2) * share, path * share * (1 - share) / sin2)
+    way = t2 - t1
+    straight = dr.sqrt(dr.fma(total, total, way * way))
+    folded = dr.sqrt(dr.square(rho1 - rho2) + way * way)
+    cos2, sin_half = _half((k2 + dr.dot(m1, m2)) / (rho1 * rho2), dr.abs(ln.kappa) * R / (rho1 * rho2))
+    b = 4 * (rho1 / (straight + folded)) * rho2
+    a = b * cos2 * (straight + folded) / (straight + R)
+    # t2 - way ρ2/total, likewise
+    lever = (c2 * (z2 - z1) - 2 * z1 * z2 * ln.ea * b0) / (total * (z2 * rho1 + z1 * rho2))
+    between = (z1 > 0) & (z2 > 0)
+    t = dr.select(between, ln.ea * R * lever - b0, t2 - way * (rho2 / total))
+    return Path(
+        t,
+        rho1 * straight / total,
+        rho2 * straight / total,
+        way / straight,
+        total / straight,
+        k * a + tiny,
+        k * b + tiny,
+        dr.rcp(k * (R + straight)),
+        dr.rcp(2 * k * straight),
+        dr.rcp(k * (straight + folded)),
+        sin_half * 2 * R / (R + straight) * dr.sqrt((straight + R) / (2 * straight)),
+    )
+
+
+def _half(cos_psi: Any, sin_psi: Any) -> tuple[Any, Any]:
+    """cos²(ψ/2) and sin(ψ/2), each from what does not cancel: ψ is π on the rim."""
+    far = cos_psi < 0
+    large = 0.5 * (1 + dr.abs(cos_psi))
+    small = sin_psi * sin_psi / (4 * large)
+    return dr.select(far, small, large), dr.sqrt(dr.select(far, large, small))
+
+
+def growth(frame: Frame, st: Path, x: Any, k: Any) -> Any:
+    """Y = k(σ - σs) at the distance x along the line from the stationary point: a detour, without cancellation."""
+    d2 = dr.square(x * st.sin)
+    along = x * st.cos
+    result = _excess(st.s0 - along, d2)
+    if not frame.plane:
+        result += _excess(st.r0 + along, d2)
+    return k * result
+
+
+def _excess(z: Any, d2: Any) -> Any:
+    """√(z² + d²) - z."""
+    root = dr.sqrt(dr.fma(z, z, d2))
+    return dr.select(z > 0, d2 / (root + dr.abs(z)), root + dr.abs(z))
 
 
 def sincos(x: Any) -> tuple[Any, Any]:
@@ -173,73 +226,124 @@ def _asinh(x: Any) -> Any:
 
 
 @dr.syntax
-def _direct(frame: Frame, ln: Line, st: Stationary, lo: Any, hi: Any, k: float, rule: Rule) -> Any:
-    """∫ C e^{ikΔ} dφ over lo..hi by panels, marched so that each spans little phase and little v."""
-    Float = type(lo)
-    Bool = dr.mask_t(Float)
-    real, imag, t = Float(0), Float(0), Float(lo)
-    active = Bool(lo < hi)
+def _panels(st: Path, first: Any, middle: Any, last: Any, rule: Rule) -> Any:
+    """∫ F e^{iY} dv / cosh v over first..last in v, twice over what lies before `middle`, over F(0)."""
+    Float = type(first)
+    real, imag, v = Float(0), Float(0), Float(first)
+    inv_B = dr.rcp(st.B)
+    active = v < last
     while active:
-        x = t - st.t
-        phase = dr.copysign(st.growth(x), x) + rule.phase / k
-        by_phase = st.t + dr.copysign(st.reach(dr.abs(phase)), phase)
-        v0 = _asinh((t - ln.td) / ln.w)
-        ev = dr.exp(v0 + rule.stretch)
-        by_stretch = ln.td + 0.5 * ln.w * (ev - dr.rcp(ev))
-        end = dr.minimum(hi, dr.minimum(by_phase, by_stretch))
-        end = dr.select(end > t, end, hi)
-        dv = _asinh((end - ln.td) / ln.w) - v0
+        twice = v < middle
+        end = dr.minimum(v + rule.stretch, dr.select(twice, middle, last))
+        width = end - v
+        weight = dr.select(twice, 2 * width, width)
         for x_j, w_j in zip(rule.nodes, rule.weights, strict=True):
-            ev = dr.exp(dr.fma(dv, x_j, v0))
+            ev = dr.exp(dr.fma(width, x_j, v))
             inv = dr.rcp(ev)
-            cosh = 0.5 * (ev + inv)
-            delta, C, _, _ = detour(frame, ln, ln.td + 0.5 * ln.w * (ev - inv), ln.eqq * dr.square(ln.w * cosh))
-            sin, cos = sincos(k * delta)
-            amplitude = w_j * dv * C / cosh
+            Y = st.A * dr.square(0.5 * (ev - inv))
+            near = dr.fma(Y, inv_B, 1) * dr.fma(Y, st.u2, 1) * dr.fma(Y, st.u3, 1)
+            amplitude = (w_j * weight) * dr.rsqrt(near) * dr.rcp(0.5 * (ev + inv) * dr.fma(Y, st.u1, 1))
+            sin, cos = dr.sincos(Y)
             real = dr.fma(amplitude, cos, real)
             imag = dr.fma(amplitude, sin, imag)
-        t = end
-        active = t < hi
-    return dr.mulsign(real, ln.kappa), dr.mulsign(imag, ln.kappa)
+        v = end
+        active = v < last
+    return real, imag
+
+
+def _root(a: Any, b: Any, tau: float) -> tuple[Any, Any]:
+    """√((1 + iaτ)(1 + ibτ)) for a, b >= 0."""
+    re, im = 1 - a * b * (tau * tau), (a + b) * tau
+    large = dr.sqrt(0.5 * (dr.sqrt(dr.fma(re, re, im * im)) + dr.abs(re)))
+    small = 0.5 * im / large
+    return dr.select(re > 0, large, small), dr.select(re > 0, small, large)
+
+
+def _tail(frame: Frame, st: Path, Y: Any, rule: Rule) -> tuple[Any, Any]:
+    """What lies beyond Y on one side, over F(0), without the phase e^{iA}."""
+    a, b = dr.rcp(Y), dr.rcp(Y + st.B)
+    c = dr.rcp(Y + st.A)
+    real, imag = 0 * Y, 0 * Y
+    scale = 0.5 * c * dr.sqrt(st.A * a * st.B * b)
+    if not frame.plane:
+        q1, q2, q3 = (u * dr.rcp(dr.fma(u, Y, 1)) for u in (st.u1, st.u2, st.u3))
+        scale *= dr.rcp(dr.fma(st.u1, Y, 1)) * dr.rsqrt(dr.fma(st.u2, Y, 1) * dr.fma(st.u3, Y, 1))
+    for tau, w in zip(rule.tail_nodes, rule.tail_weights, strict=True):
+        x, y = _root(a, b, tau)
+        x, y = x - y * (c * tau), dr.fma(x, c * tau, y)
+        if not frame.plane:
+            u, v = _root(q2, q3, tau)
+            x, y = x * u - y * v, x * v + y * u
+            x, y = x - y * (q1 * tau), dr.fma(x, q1 * tau, y)
+        inv = w * dr.rcp(dr.fma(x, x, y * y))
+        real = dr.fma(x, inv, real)
+        imag = dr.fma(y, inv, imag)
+    # i (real - i imag) e^{iY}
+    sin, cos = sincos(Y)
+    return scale * (imag * cos - real * sin), scale * (real * cos + imag * sin)
+
+
+def _tail_error(st: Path, Y: Any, rule: Rule) -> Any:
+    """Of a tail from Y on, relative to it: what the rule leaves, and the rounding of its phase."""
+    return rule.tail_error * dr.square(rule.K / Y) + 4 * dr.epsilon(Y) * (Y + st.A)
+
+
+class Wave(NamedTuple):
+    """A segment's wave, real and imaginary part, and the same of its error."""
+
+    real: Any
+    imag: Any
+    err_real: Any
+    err_imag: Any
 
 
 @dr.syntax
-def segment_wave(
-    frame: Frame, X0: Any, e: Any, length: Any, k: float, rule: Rule, active: Any
-) -> tuple[Any, Any, Any, Any, Any]:
-    """∫ C e^{ikΔ} dφ over X0 + t e, 0 <= t <= length.
-
-    X0 (3), e (3) unit, length: arrays of one precision, X0 relative to the outlines' centre; k: wavenumber.
-    Returns its real and imaginary part, the same of the error estimate, and κ = a·(q0×e).
-    """
+def segment_wave(frame: Frame, ln: Line, length: Any, k: Any, rule: Rule, active: Any) -> Wave:
+    """∫ C e^{ikΔ} dφ over X0 + t e, 0 <= t <= length, and its error; k: wavenumber; all of one precision."""
     Float = type(length)
-    ln = line(frame, X0, e)
-    st = stationary(frame, ln, (e - ln.ea * frame.a, ln.q0))
-    half = st.reach(Float(rule.K / k))
-    # between the stationary point and the foot neither series nor its poles are far: keep both inside
-    lo = dr.clip(dr.minimum(st.t, ln.td) - half, 0, length)
-    hi = dr.clip(dr.maximum(st.t, ln.td) + half, 0, length)
-    # outside, one series serves the whole segment
-    left, right = lo > 0, hi < length
-    t0 = dr.select(left, Float(0), hi)
-    t1 = dr.select(right, length, lo)
-    r0, i0, er0, ei0, _ = end_wave(frame, ln, t0, k)
-    r1, i1, er1, ei1, _ = end_wave(frame, ln, t1, k)
-    series = left | right
-    real = dr.select(series, r1 - r0, 0)
-    imag = dr.select(series, i1 - i0, 0)
-    err_r = dr.select(series, er1 - er0, 0)
-    err_i = dr.select(series, ei1 - ei0, 0)
-    if active & (hi > lo):
-        dre, dim = _direct(frame, ln, st, lo, hi, k, rule)
-        real = real + dre
-        imag = imag + dim
-        # a segment that sticks out on both sides: take the series' jump over the middle back out
-        if left & right:
-            rl, il, erl, eil, _ = end_wave(frame, ln, lo, k)
-            rh, ih, erh, eih, _ = end_wave(frame, ln, hi, k)
-            real = real - (rh - rl)
-            imag = imag - (ih - il)
-            err_r = err_r - (erh - erl)
-            err_i = err_i - (eih - eil)
-    return real, imag, err_r, err_i, ln.kappa
+    st = path(frame, ln, k)
+    x0, x1 = -st.t, length - st.t
+    Y0, Y1 = growth(frame, st, x0, k), growth(frame, st, x1, k)
+    both = (x0 < 0) & (x1 > 0)
+    near, far = dr.minimum(Y0, Y1), dr.maximum(Y0, Y1)
+    K = Float(rule.K)
+    real, imag, err_r, err_i = Float(0), Float(0), Float(0), Float(0)
+    if active & (far > K):
+        # out of the far end
+        re, im = _tail(frame, st, far, rule)
+        real, imag = real - re, imag - im
+        left = _tail_error(st, far, rule)
+        err_r, err_i = err_r - left * re, err_i - left * im
+    if active & (near > K):
+        re, im = _tail(frame, st, near, rule)
+        flip = dr.select(both, Float(-1), Float(1))
+        real, imag = dr.fma(flip, re, real), dr.fma(flip, im, imag)
+        left = flip * _tail_error(st, near, rule)
+        err_r, err_i = dr.fma(left, re, err_r), dr.fma(left, im, err_i)
+    inside = both | (near <= K)
+    if active & inside:
+        first = dr.select(both, Float(0), _reach(st, near, rule))
+        middle = dr.select(both, _reach(st, dr.minimum(near, K), rule), first)
+        last = _reach(st, dr.minimum(far, K), rule)
+        re, im = _panels(st, first, middle, last, rule)
+        real, imag = real + re, imag + im
+        if far > K:
+            # both sides, or one, go on beyond K
+            re, im = _tail(frame, st, K, rule)
+            count = dr.select(both & (near > K), Float(2), Float(1))
+            real, imag = dr.fma(count, re, real), dr.fma(count, im, imag)
+            err_r, err_i = dr.fma(count * rule.tail_error, re, err_r), dr.fma(count * rule.tail_error, im, err_i)
+    sin, cos = sincos(st.A)
+    scale = dr.mulsign(st.front, ln.kappa)
+    turn_r, turn_i = scale * cos, scale * sin
+    return Wave(
+        real * turn_r - imag * turn_i,
+        real * turn_i + imag * turn_r,
+        err_r * turn_r - err_i * turn_i,
+        err_r * turn_i + err_i * turn_r,
+    )
+
+
+def _reach(st: Path, Y: Any, rule: Rule) -> Any:
+    """v where A sinh² v is Y, at most `rule.cut`."""
+    return dr.minimum(_asinh(dr.sqrt(Y / st.A)), rule.cut)

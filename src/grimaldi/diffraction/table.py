@@ -8,10 +8,10 @@ import drjit as dr
 import numpy as np
 from numpy.typing import NDArray
 
-from grimaldi.diffraction.arrays import Types
+from grimaldi.diffraction.arrays import Types, on_device
 from grimaldi.diffraction.model import Options
 from grimaldi.outlines.model import Outline
-from grimaldi.scene.model import Vector
+from grimaldi.scene.model import Source, Vector
 
 LONGEST_PIECE = 8  # segments
 
@@ -42,12 +42,17 @@ class Table(NamedTuple):
 
     centre: Vector
     reach: float  # from the centre to the furthest corner
-    size: int  # segments
-    n_pieces: int
+    from_source: float  # from the source to the nearest segment, infinite for a plane wave
+    size: Any  # segments
+    n_pieces: Any
     segments: Any
     ranges: Any
     pieces: Any
     types: Types
+
+    def device(self, number: float) -> Any:
+        """A number that is no part of the kernel."""
+        return on_device(self.types.Float, number)
 
     def segment(self, i: Any) -> Segment:
         P, V = self.types.Packet, self.types.Vector
@@ -99,11 +104,21 @@ def needs_double(outline: Outline, k: float, options: Options) -> bool:
     return k * float(np.ptp(ends, axis=0).max()) > 1e6
 
 
-def table(outline: Outline, types: Types, ranges: NDArray[np.int64] | None = None) -> Table:
-    """Pack an outline; its pieces begin at the segments `ranges`, the last of which is their number (`cut`)."""
+def _distance(source: Source, outline: Outline) -> float:
+    if source.position is None:
+        return np.inf
+    span, v = outline.end - outline.start, source.position - outline.start
+    t = np.clip((v * span).sum(1) / np.maximum((span * span).sum(1), 1e-300), 0, 1)
+    return float(np.linalg.norm(v - t[:, None] * span, axis=1).min())
+
+
+def table(outline: Outline, source: Source, types: Types, ranges: NDArray[np.int64] | None = None) -> Table:
+    """Pack what a source sees; its pieces begin at the segments `ranges`, the last of which is their number (`cut`)."""
     ends = np.concatenate([outline.start, outline.end])
     low, high = ends.min(0), ends.max(0)
-    centre = 0.5 * (low + high)
+    # on a coarse grid, so that differences to it are exact and points stay as near each other as they were
+    grid = 2.0 ** np.floor(np.log2(max(float(np.ptp(ends, axis=0).max()), 1e-300)) - 2)
+    centre = grid * np.round(0.5 * (low + high) / grid)
     ranges = cut(outline) if ranges is None else ranges
     X0, X1 = outline.start - centre, outline.end - centre
     length = np.linalg.norm(X1 - X0, axis=1, keepdims=True)
@@ -123,8 +138,9 @@ def table(outline: Outline, types: Types, ranges: NDArray[np.int64] | None = Non
     return Table(
         centre,
         float(np.linalg.norm(np.concatenate([X0, X1]), axis=1).max()),
-        len(outline),
-        len(middle),
+        _distance(source, outline),
+        on_device(index, len(outline)),
+        on_device(index, len(middle)),
         types.buffer(segments),
         index(ranges.astype(np.uint32)),
         types.buffer(pieces),
