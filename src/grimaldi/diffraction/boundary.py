@@ -23,7 +23,7 @@ from grimaldi.diffraction.table import Table, needs_double, table
 from grimaldi.outlines.model import Outline
 from grimaldi.scene.model import Scene, Source
 
-HIDDEN_END = 0.5  # of the tolerance: what an untested X→P may at most leave behind
+HIDDEN_END = 0.02  # of the tolerance: what an untested X→P may at most leave behind
 
 
 class Problem(NamedTuple):
