@@ -164,6 +164,75 @@ def edge_wave(
     return -_boundary(source, points, outline, wavelength, 0.0, visible)
 
 
+def polygon_factor(source: Source, points: ArrayLike, loop: ArrayLike, wavelength: float) -> Factors:
+    """M (m,) behind an opening with corners (n, 3), by eq. 6 side by side, to about 1e-13 wherever the points are.
+
+    The ray's line must cross the opening between source and receiver, if it does. On a side at the distance w from the
+    ray, t = t_d + w sinh v takes out the pole of dφ; panels in v are halved until 20 Gauss-Legendre nodes serve each.
+    """
+    k = 2 * np.pi / wavelength
+    corners = np.asarray(loop, float)
+    receivers = np.atleast_2d(np.asarray(points, float))
+    result = np.zeros(len(receivers), complex)
+    for i, p in enumerate(receivers):
+        for first, second in zip(corners, np.roll(corners, -1, axis=0), strict=True):
+            result[i] += _side(source, p, first, second, k) / (2 * np.pi)
+    return result * np.sign(_area_vector(corners) @ _ray(source, corners.mean(axis=0)))
+
+
+def _side(source: Source, p: Reals, first: Reals, second: Reals, k: float) -> complex:
+    length = float(np.linalg.norm(second - first))
+    e = (second - first) / length
+    a, distance = _ray(source, p), np.inf
+    if isinstance(source, Spherical):
+        distance = float(np.linalg.norm(a))
+        a = a / distance
+    h = (first - p) @ a
+    q0 = first - p - h * a
+    ea = float(e @ a)
+    eq = e - ea * a
+    eqq, kappa = float(eq @ eq), float(a @ np.cross(q0, eq))
+    if kappa == 0:
+        return 0
+    foot, w = -float(q0 @ eq) / eqq, abs(kappa) / eqq
+
+    def integrand(v: Reals) -> NDArray[np.complex128]:
+        t, d2 = foot + w * np.sinh(v), eqq * (w * np.cosh(v)) ** 2
+        z2 = -(h + t * ea)
+        z1 = distance - z2
+        detour = _excess(z2, d2) + (_excess(z1, d2) if np.isfinite(distance) else 0)
+        c = 0.5 * (1 + _cosine(z1, z2, d2))
+        return (1 - c * np.exp(1j * k * detour)) / np.cosh(v)
+
+    x, weights = _gauss(20)
+
+    def panels(low: Reals, high: Reals) -> NDArray[np.complex128]:
+        width = (high - low)[:, None]
+        return (width * weights * integrand(low[:, None] + width * x)).sum(axis=1)
+
+    v0, v1 = np.arcsinh(-foot / w), np.arcsinh((length - foot) / w)
+    ends = np.linspace(v0, v1, max(int(abs(v1 - v0) / 0.7), 2) + 1)
+    low, high = ends[:-1], ends[1:]
+    whole, total = panels(low, high), 0j
+    while len(low):
+        middle = 0.5 * (low + high)
+        left, right = panels(low, middle), panels(middle, high)
+        good = abs(whole - left - right) < 1e-14
+        total += complex((left + right)[good].sum())
+        low, high = np.concatenate([low[~good], middle[~good]]), np.concatenate([middle[~good], high[~good]])
+        whole = np.concatenate([left[~good], right[~good]])
+    return float(np.sign(kappa)) * total
+
+
+def _ray(source: Source, x: Reals) -> Reals:
+    """From the source to x, or along a plane wave."""
+    return np.asarray(source.direction, float) if isinstance(source, Plane) else x - np.asarray(source.position, float)
+
+
+def _area_vector(corners: Reals) -> Reals:
+    return np.cross(corners, np.roll(corners, -1, axis=0)).sum(axis=0)
+
+
 def _boundary(
     source: Source,
     points: ArrayLike,
@@ -195,14 +264,9 @@ def _boundary(
         integrand = (geometric - c * np.exp(1j * k * detour)) * azimuth
         result[i] = integrand[visible[i]].sum() / (2 * np.pi)
     # A loop's sense is a convention: it follows its own area vector, seen along the ray.
-    side = np.sign(np.cross(outline.x - outline.x.mean(axis=0), outline.w).sum(axis=0) @ _axis(source, outline))
+    middle = outline.x.mean(axis=0)
+    side = np.sign(np.cross(outline.x - middle, outline.w).sum(axis=0) @ _ray(source, middle))
     return side * result
-
-
-def _axis(source: Source, outline: Nodes) -> Reals:
-    if isinstance(source, Plane):
-        return np.asarray(source.direction, float)
-    return outline.x.mean(axis=0) - np.asarray(source.position, float)
 
 
 def _excess(z: Reals, d2: Reals) -> Reals:

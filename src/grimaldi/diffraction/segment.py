@@ -171,10 +171,10 @@ def path(frame: Frame, ln: Line, k: Any) -> Path:
     cos2, sin_half = _half((k2 + dr.dot(m1, m2)) / (rho1 * rho2), dr.abs(ln.kappa) * R / (rho1 * rho2))
     b = 4 * (rho1 / (straight + folded)) * rho2
     a = b * cos2 * (straight + folded) / (straight + R)
-    # t2 - way ρ2/total, likewise
+    # likewise (t2 ρ1 + t1 ρ2)/total
     lever = (c2 * (z2 - z1) - 2 * z1 * z2 * ln.ea * b0) / (total * (z2 * rho1 + z1 * rho2))
-    between = (z1 > 0) & (z2 > 0)
-    t = dr.select(between, ln.ea * R * lever - b0, t2 - way * (rho2 / total))
+    outside = dr.select(rho1 < rho2, t1 + way * (rho1 / total), t2 - way * (rho2 / total))
+    t = dr.select((z1 > 0) & (z2 > 0), ln.ea * R * lever - b0, outside)
     return Path(
         t,
         rho1 * straight / total,
@@ -261,13 +261,9 @@ def _root(a: Any, b: Any, tau: float) -> tuple[Any, Any]:
 
 def _tail(frame: Frame, st: Path, Y: Any, rule: Rule) -> tuple[Any, Any]:
     """What lies beyond Y on one side, over F(0), without the phase e^{iA}."""
-    a, b = dr.rcp(Y), dr.rcp(Y + st.B)
-    c = dr.rcp(Y + st.A)
+    a, b, c = dr.rcp(Y), dr.rcp(Y + st.B), dr.rcp(Y + st.A)
     real, imag = 0 * Y, 0 * Y
-    scale = 0.5 * c * dr.sqrt(st.A * a * st.B * b)
-    if not frame.plane:
-        q1, q2, q3 = (u * dr.rcp(dr.fma(u, Y, 1)) for u in (st.u1, st.u2, st.u3))
-        scale *= dr.rcp(dr.fma(st.u1, Y, 1)) * dr.rsqrt(dr.fma(st.u2, Y, 1) * dr.fma(st.u3, Y, 1))
+    q1, q2, q3 = (u * dr.rcp(dr.fma(u, Y, 1)) for u in (st.u1, st.u2, st.u3))
     for tau, w in zip(rule.tail_nodes, rule.tail_weights, strict=True):
         x, y = _root(a, b, tau)
         x, y = x - y * (c * tau), dr.fma(x, c * tau, y)
@@ -278,6 +274,8 @@ def _tail(frame: Frame, st: Path, Y: Any, rule: Rule) -> tuple[Any, Any]:
         inv = w * dr.rcp(dr.fma(x, x, y * y))
         real = dr.fma(x, inv, real)
         imag = dr.fma(y, inv, imag)
+    scale = 0.5 * c * dr.sqrt(st.A * a * st.B * b)
+    scale *= dr.rcp(dr.fma(st.u1, Y, 1)) * dr.rsqrt(dr.fma(st.u2, Y, 1) * dr.fma(st.u3, Y, 1))
     # i (real - i imag) e^{iY}
     sin, cos = sincos(Y)
     return scale * (imag * cos - real * sin), scale * (real * cos + imag * sin)

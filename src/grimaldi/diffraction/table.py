@@ -97,8 +97,8 @@ def cut(outline: Outline) -> NDArray[np.int64]:
 
 
 def needs_double(outline: Outline, k: float, options: Options) -> bool:
-    """Float32 rounding grows as √(kΔ): enough at 1e-4 up to outlines of 1e6 radians."""
-    if options.precision == "double" or options.tolerance < 1e-4:
+    """Float32 rounding grows as √(kΔ): enough at 5e-4 up to outlines of 1e6 radians, but for receivers beside edges."""
+    if options.precision == "double" or options.tolerance < 5e-4:
         return True
     ends = np.concatenate([outline.start, outline.end])
     return k * float(np.ptp(ends, axis=0).max()) > 1e6
