@@ -22,7 +22,8 @@ class Curve:
     computed: NDArray[np.complex128] | NDArray[np.float64]
     expected: NDArray[np.complex128] | NDArray[np.float64]
     label: str  # of x, with its unit
-    quantity: str  # what is compared: "M", "U" or "I/I₀"
+    quantity: str  # what is compared: "M", "U/U₀", "I/I₀"
+    is_logarithmic: bool = False
 
 
 @dataclass(frozen=True, eq=False)

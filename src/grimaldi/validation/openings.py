@@ -124,7 +124,7 @@ def _slits(name: str, count: int) -> Case:
     length = 10 * np.sqrt(z)
     middles = spacing * (np.arange(count) - (count - 1) / 2)
     far = middles[-1] + width
-    x = np.linspace(-1.5, 1.5, 201) * far
+    x = np.linspace(-1.5, 1.5, 401 * count) * far
     m, seconds = factor(line(x, z), tolerance, outlines=[box(width, length, c) for c in middles])
     expected = slit.several(count, width, spacing, x, z, 1) * slit.factor(length, 0.0, z, 1)
     each = "a slit" if count == 1 else f"{count} slits 2 √(λz) apart,"
@@ -158,7 +158,7 @@ def airy_rings() -> Case:
         0.5 * axis**2,
         seconds,
         f"N = 1e-4: the remainder (πN)²/2 is {0.5 * axis:.1g} of the axis' |M| = {axis:.2g}",
-        Curve(w, m / axis, expected / axis, "k a sinθ", "M/πN"),
+        Curve(w, m, expected, "k a sinθ", "M", is_logarithmic=True),
     )
 
 

@@ -40,6 +40,7 @@ def _sphere(boundary: sphere.Boundary) -> Case:
         tolerance,
         0.0,
         seconds,
-        f"ka = {SIZE:g}, {BEHIND:g} radii behind: rms {rms(m, expected):.2g}; a black one has a spot {ratio:.2g} times as bright",
+        f"ka = {SIZE:g}, {BEHIND:g} radii behind: rms {rms(m, expected):.2g}; "
+        f"a black one has a spot {ratio:.2g} times as bright",
         Curve(x / radius, m, expected, "x/a", "M"),
     )

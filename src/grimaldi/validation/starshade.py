@@ -55,7 +55,9 @@ def starshade(folder: Path) -> Case:
         PROMISE - TOLERANCE,
         seconds,
         f"||U| - |U_ref|| over the pupil: {said}; {2 * petals * corners} corners",
-        Curve(x[pupil][row], computed[-1][row], expected[-1][row], "x across the pupil [m]", "|U|"),
+        Curve(
+            x[pupil][row], computed[-1][row], expected[-1][row], "x across the pupil [m]", "|U|", is_logarithmic=True
+        ),
     )
 
 
