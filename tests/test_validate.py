@@ -13,7 +13,7 @@ import pytest
 
 from grimaldi.errors import InputError
 from grimaldi.validation import CASES, chosen, report
-from grimaldi.validation.model import Case, Curve, Settings
+from grimaldi.validation.model import STARSHADE_FILES, Case, Curve, Settings
 
 FAST = "young,kite"
 
@@ -110,6 +110,8 @@ def test_the_starshade_needs_its_data(tmp_path):
     with pytest.raises(InputError, match=r"^starshade: its data is not at hand; give"):
         chosen(["starshade"], Settings(tmp_path))
     (tmp_path / "data" / "starshade").mkdir(parents=True)
+    for name in STARSHADE_FILES:
+        (tmp_path / "data" / "starshade" / name).touch()
     assert [*chosen(["starshade", "edge"], Settings(tmp_path))] == ["edge", "starshade"]
 
 

@@ -18,7 +18,12 @@ def validate(
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON in place of the table.")] = False,
     output: Annotated[
         Path | None,
-        typer.Option("--output", "-o", help="Write accuracy.md and a plot a case into this folder.", metavar="DIR"),
+        typer.Option(
+            "--output",
+            "-o",
+            help="Write accuracy.md, of these cases, and a plot of each into this folder.",
+            metavar="DIR",
+        ),
     ] = None,
     data: Annotated[
         Path | None, typer.Option(help="Folder of the benchmark data.  [default: ../shared, if there]")

@@ -82,8 +82,8 @@ def double_knife_edge() -> Case:
         tolerance,
         0.0,
         seconds + more,
-        f"single diffraction at edges {apart:g} λ apart and 20 λ out of line is rms {rms(m, expected):.2g} from double; "
-        f"up to {in_line:.2g} where they are in line",
+        f"single diffraction at edges {apart:g} λ apart and 20 λ out of line is rms {rms(m, expected):.2g} from "
+        f"double; up to {in_line:.2g} where they are in line",
         Curve(x, m, expected, "x [λ], shadow right", "M"),
     )
 

@@ -11,6 +11,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+STARSHADE_FILES = ("wfirst.dat", "test_data__wfirst.h5")
+
 Regime = Literal["exact", "Fresnel", "far field", "other model"]
 
 
@@ -80,7 +82,7 @@ class Settings:
     def starshade(self) -> Path | None:
         """The folder of the WFIRST starshade, where it is at hand."""
         path = None if self.data is None else self.data / "data" / "starshade"
-        return path if path is not None and path.is_dir() else None
+        return path if path is not None and all((path / name).is_file() for name in STARSHADE_FILES) else None
 
 
 Check = Callable[[], Case]

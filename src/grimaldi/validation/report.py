@@ -24,8 +24,9 @@ Every closed form in `grimaldi.reference` against `grimaldi.field`, written by
 Errors are the largest |ΔM| along the plotted line, M = U/U₀, unless a row says otherwise; digits are -log₁₀ of that.
 `asked` is the tolerance that `field` was given, always with `precision="double"`; `remainder` is how far at most the
 reference is from Kirchhoff's integral itself, where it is Fresnel's approximation or a far field, or what rounding
-path lengths costs. A promise is kept where the error is within both. References of another model (boundary conditions,
-double diffraction) are no promise: their rows state how far a black screen is from them; see [limits.md](limits.md).
+path lengths costs; for the starshade, how near to the published field we promise to be. A promise is kept where the
+error is within both. References of another model (boundary conditions, double diffraction) are no promise: their rows
+state how far a black screen is from them; see [limits.md](limits.md).
 """
 
 
@@ -106,7 +107,7 @@ def page(cases: Sequence[Case]) -> str:
 
 def _table(cases: Sequence[Case]) -> str:
     lines = [
-        "| case | reference | regime | digits | error | asked | remainder | time | verdict | |",
+        "| case | reference | regime | digits | error | asked | remainder | time | verdict | statement |",
         "|---|---|---|---|---|---|---|---|---|---|",
     ]
     for case in cases:
