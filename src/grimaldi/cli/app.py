@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from grimaldi import __version__
-from grimaldi.cli import doctor, field, figures, outline, render
+from grimaldi.cli import doctor, field, figures, outline, render, validate
 
 
 def _version(asked: bool) -> None:
@@ -37,4 +37,5 @@ app.command("render")(render.render)
 app.command("field")(field.field)
 app.command("outline")(outline.outline)
 app.command("figures")(figures.figures)
+app.command("validate")(validate.validate)
 app.command("doctor")(doctor.doctor)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from grimaldi.reference import fresnel_edge
+from grimaldi.reference import slit
 
 
 def factor(
@@ -23,15 +23,6 @@ def factor(
     `distance` z2, `source_distance` z1: of that plane from receiver and source. Leaves out phases of
     order k b⁴ (1/z1³ + 1/z2³)/8, b being the distance of the rim from the ray.
     """
-    return _slit(width, x, distance, wavelength, source_distance) * _slit(
+    return slit.factor(width, x, distance, wavelength, source_distance) * slit.factor(
         height, y, distance, wavelength, source_distance
     )
-
-
-def _slit(
-    width: float, x: ArrayLike, distance: float, wavelength: float, source_distance: float
-) -> NDArray[np.complex128]:
-    x = np.asarray(x, float)
-    sides = (fresnel_edge.parameter(side * width / 2 - x, distance, wavelength, source_distance) for side in (-1, 1))
-    left, right = (fresnel_edge.factor(v) for v in sides)
-    return left - right
