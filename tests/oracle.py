@@ -177,7 +177,8 @@ def polygon_factor(source: Source, points: ArrayLike, loop: ArrayLike, wavelengt
     for i, p in enumerate(receivers):
         for first, second in zip(corners, np.roll(corners, -1, axis=0), strict=True):
             result[i] += _side(source, p, first, second, k) / (2 * np.pi)
-    return result * np.sign(_area_vector(corners) @ _ray(source, corners.mean(axis=0)))
+    sign = np.sign(_area_vector(corners) @ _ray(source, corners.mean(axis=0)))
+    return np.asarray(sign * result, complex)
 
 
 def _side(source: Source, p: Reals, first: Reals, second: Reals, k: float) -> complex:
@@ -202,7 +203,7 @@ def _side(source: Source, p: Reals, first: Reals, second: Reals, k: float) -> co
         z1 = distance - z2
         detour = _excess(z2, d2) + (_excess(z1, d2) if np.isfinite(distance) else 0)
         c = 0.5 * (1 + _cosine(z1, z2, d2))
-        return (1 - c * np.exp(1j * k * detour)) / np.cosh(v)
+        return np.asarray((1 - c * np.exp(1j * k * detour)) / np.cosh(v), complex)
 
     x, weights = _gauss(20)
 

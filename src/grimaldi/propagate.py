@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import drjit as dr
@@ -11,7 +12,8 @@ import numpy as np
 from grimaldi.diffraction.frame import incident
 from grimaldi.diffraction.model import Model, Options, Receivers
 from grimaldi.diffraction.screen import beyond
-from grimaldi.outlines.extract import curve, outline
+from grimaldi.outlines.candidate import least_sag
+from grimaldi.outlines.extract import curve, is_curved, outline
 from grimaldi.outlines.model import Reals
 from grimaldi.scene.model import Scene, Source
 
@@ -33,7 +35,8 @@ def propagate(
     pure and can be traced inside a larger kernel.
     """
     scene = scene.before(source)
-    seen = outline(scene, source, sag=_sags(scene, source, options.tolerance / k, where))
+    sags, detour = _sags(scene, source, options.tolerance / k, where)
+    seen = replace(outline(scene, source, sag=sags), detour=detour)
     factor = model(scene, source, seen, k, options)
 
     ahead = None if source.aperture is None else beyond(source.aperture, source)
@@ -50,12 +53,12 @@ def propagate(
     return wave
 
 
-def _sags(scene: Scene, source: Source, path: float, where: Reals) -> list[float]:
-    """How coarse each curve's polygon may be for Δ to err by `path` at points `where`.
+def _sags(scene: Scene, source: Source, path: float, where: Reals) -> tuple[list[float], float]:
+    """How coarse each curve's polygon may be for Δ to err by `path` at points `where`, and by what it will.
 
     Across the ray |∇Δ| <= d (1/z1 + 1/z2), d the distance of the outline from it, and never more than 2.
     """
-    sags = []
+    sags, detour = [], 0.0
     for shape in scene.screen or [body.geometry for body in scene.bodies]:
         centre, radius = curve(shape)
         if source.position is None:
@@ -68,6 +71,8 @@ def _sags(scene: Scene, source: Source, path: float, where: Reals) -> list[float
         v = where - centre
         d = np.linalg.norm(v - np.einsum("ij,ij->i", v, a)[:, None] * a, axis=1) + radius
         z2 = np.maximum(np.linalg.norm(v, axis=1) - radius, 0.5 * radius)
-        slope = float((d * (1 / z1 + 1 / z2)).max(initial=1e-3))
-        sags.append(min(path / min(slope, 2.0), 0.01 * radius))
-    return sags
+        slope = min(float((d * (1 / z1 + 1 / z2)).max(initial=1e-3)), 2.0)
+        sags.append(min(path / slope, 0.01 * radius))
+        if is_curved(shape):
+            detour = max(detour, slope * max(sags[-1], least_sag(radius)))
+    return sags, detour

@@ -19,7 +19,7 @@ from grimaldi.diffraction.model import Evaluate, Factor, Options, Receivers
 from grimaldi.diffraction.occlusion import rays
 from grimaldi.diffraction.screen import beyond
 from grimaldi.diffraction.segment import Rule
-from grimaldi.diffraction.table import Table, needs_double, table
+from grimaldi.diffraction.table import CURVE, Table, needs_double, table
 from grimaldi.outlines.model import Outline
 from grimaldi.scene.model import Scene, Source
 
@@ -34,6 +34,11 @@ class Problem(NamedTuple):
     outline: Outline
     k: float
     options: Options
+
+    def rule(self) -> Rule:
+        """For segments, with what the polygons of curves leave as part of its share."""
+        rule = Rule.of(self.options.tolerance)
+        return rule._replace(share=rule.share + CURVE * self.k * self.outline.detour)
 
 
 def boundary(scene: Scene, source: Source, outline: Outline, k: float, options: Options) -> Evaluate:
@@ -97,7 +102,7 @@ def _planar(problem: Problem, precision: Types) -> Evaluate:
     """Coplanar holes in a screen, or masks; M = 1 on the source's own side."""
     screen, source = problem.scene.screen[0], problem.source
     tab = table(problem.outline, source, precision)
-    rule, k = Rule.of(problem.options.tolerance), problem.k
+    rule, k = problem.rule(), problem.k
     far = beyond(screen, source)
 
     def evaluate(receivers: Receivers) -> Factor:
@@ -114,7 +119,7 @@ def _planar(problem: Problem, precision: Types) -> Evaluate:
 def _bodies(problem: Problem, precision: Types) -> Evaluate:
     source, options = problem.source, problem.options
     tab = table(problem.outline, source, precision)
-    rule, k = Rule.of(options.tolerance), problem.k
+    rule, k = problem.rule(), problem.k
     probe = rays(problem.scene, source, problem.outline.sag)
 
     def evaluate(receivers: Receivers) -> Factor:

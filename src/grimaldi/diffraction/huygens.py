@@ -26,7 +26,7 @@ from grimaldi.diffraction.model import NYQUIST, Evaluate, Factor, Options, Recei
 from grimaldi.diffraction.occlusion import Rays, rays
 from grimaldi.diffraction.screen import beyond
 from grimaldi.diffraction.segment import Line, detour, line, sincos
-from grimaldi.diffraction.table import Segment, Table, needs_double, table
+from grimaldi.diffraction.table import CURVE, Segment, Table, needs_double, table
 from grimaldi.errors import InputError
 from grimaldi.outlines.divided import divided, joined
 from grimaldi.outlines.model import Integers, Outline, Reals
@@ -35,7 +35,6 @@ from grimaldi.scene.model import Scene, Source
 
 DEFAULT = 3  # sources an edge, as in the report's figure 5
 MOST = 10_000_000  # sources: 1.5 GB of them
-CURVE = 0.1  # of the tolerance: what the polygons of curves may leave (`propagate`)
 
 Weight = Callable[[Frame, Segment, Line, Any, Any, Any, Any], Any]
 """w R/(r s) of the source in the middle of a segment, from frame, segment, line, C, 1/r, 1/s and its own length."""
@@ -85,7 +84,7 @@ def huygens(scene: Scene, source: Source, outline: Outline, k: float, options: O
         lengths = _shared(lengths, sources.body)
     lamps = Lamps(tab, tab.types.Float(lengths), _kernel if options.weights == "kernel" else _forward)
     rounding = 2e-15 if dr.itemsize_v(tab.types.Float) == 8 else 5e-7
-    floor = rounding + (CURVE * options.tolerance if sources.sag > 0 else 0)
+    floor = rounding + CURVE * k * outline.detour
     if scene.screen:
         return _planar(scene, source, lamps, k, floor, geometric)
     return _bodies(scene, source, lamps, sources.sag, k, floor, options.occlusion, geometric)

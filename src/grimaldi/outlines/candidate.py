@@ -10,6 +10,8 @@ import numpy as np
 from grimaldi.outlines.model import Integers, Reals
 from grimaldi.scene.model import Source
 
+FINEST = 65536  # segments of a curve
+
 
 @dataclass(frozen=True, eq=False)
 class Candidates:
@@ -53,8 +55,13 @@ def closed_curve(points: Reals, normals: Reals) -> Candidates:
 
 
 def segments_for(radius: float, sag: float) -> int:
-    """How many segments keep a circle's polygon within `sag` of it: sag = r π²/2n²."""
-    return int(np.clip(np.ceil(np.pi * np.sqrt(radius / (2 * sag))), 16, 65536))
+    """How many segments keep a circle's polygon within `sag` of it, sag = r π²/2n², at most `FINEST`."""
+    return int(np.clip(np.ceil(np.pi * np.sqrt(radius / (2 * sag))), 16, FINEST))
+
+
+def least_sag(radius: float) -> float:
+    """The sag of a circle's finest polygon."""
+    return radius * np.pi**2 / (2 * FINEST**2)
 
 
 def polygon(n: int) -> Reals:

@@ -43,7 +43,7 @@ def outline(scene: Scene, source: Source, *, sag: Sequence[float] | None = None)
     extents = np.array([np.linalg.norm(np.ptp(part.start, axis=0)) if len(part.start) else 0.0 for part in parts])
     standing = obstacles(scene.bodies, source)
     lit = lit_parts(standing, source, edges, body, LONGEST * extents[body])
-    coarsest = max((s for b, s in zip(scene.bodies, sag, strict=True) if not isinstance(b.geometry, Mesh)), default=0.0)
+    coarsest = max((s for b, s in zip(scene.bodies, sag, strict=True) if is_curved(b.geometry)), default=0.0)
     return assemble(edges, body, lit, gap_behind(standing, source, edges, body, lit), source, coarsest)
 
 
@@ -56,6 +56,11 @@ def curve(shape: Geometry | PlanarOutline) -> tuple[Reals, float]:
         low, high = points.min(axis=0), points.max(axis=0)
         return 0.5 * (low + high), 0.5 * float(np.linalg.norm(high - low))
     return shape.to_world[:3, 3], float(np.linalg.norm(shape.to_world[:3, :2]))
+
+
+def is_curved(shape: Geometry | PlanarOutline) -> bool:
+    """Whether its outline is a polygon in the place of a curve."""
+    return shape.is_ellipse if isinstance(shape, PlanarOutline) else not isinstance(shape, Mesh)
 
 
 def _silhouette(body: Body, source: Source, sag: float) -> Candidates:

@@ -30,6 +30,7 @@ class Outline:
     behind: Reals  # (n,) how far behind it, along the ray, its own body comes next; inf behind outer outlines
     chain: Integers  # (n,) segments of one chain follow each other in the arrays, end to start
     sag: float = 0.0  # how far a segment may lie from the curve that it stands for [scene units]
+    detour: float = 0.0  # how much Δ may err for that where the field is asked [scene units]
 
     def __len__(self) -> int:
         return len(self.start)
