@@ -60,8 +60,8 @@ class Rule(NamedTuple):
         )
 
 
-# Least tolerance, K, nodes a panel, its width, nodes of a tail, and the median of a tail's error relative to it at K over
-# random geometries. The largest errors, printed by benchmarks/segment_rules.py, are below a tenth of the tolerance.
+# Least tolerance, K, nodes a panel, its width, nodes of a tail, and the median of a tail's error relative to it at K
+# over random geometries; the largest errors (benchmarks/segment_rules.py) are below a tenth of the tolerance.
 RULES = (
     (5e-3, 3.0, 4, 1.2, 2, 5e-2),
     (5e-4, 4.0, 5, 1.2, 3, 6e-3),
