@@ -1,0 +1,82 @@
+"""What a field's numbers are worth: said where the tolerance was not reached, and where light is fainter than it."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from grimaldi.errors import GrimaldiWarning
+from grimaldi.outlines.extract import outline
+from grimaldi.outlines.model import Outline
+from grimaldi.scene.model import Scene, Source, Vector
+
+Reals = NDArray[np.float64]
+
+FEW = 3  # tolerances: light fainter than that has no digits
+
+
+@dataclass
+class Misses:
+    """At how many points |M_computed - M| is estimated above the tolerance, and where it is largest."""
+
+    tolerance: float
+    count: int = 0
+    of: int = 0
+    worst: float = 0.0
+    source: Source | None = None
+    point: Vector | None = None
+
+    def add(self, source: Source, points: Reals, error: Reals, free: Reals) -> None:
+        """Take in one source's estimated |U_computed - U| and its |U0| at points (n, 3)."""
+        of_m = np.divide(error, free, out=np.zeros_like(error), where=free > 0)
+        self.count += int((of_m > self.tolerance).sum())
+        self.of += len(points)
+        if len(of_m) and of_m.max() > self.worst:
+            self.worst, self.source, self.point = float(of_m.max()), source, points[of_m.argmax()]
+
+    def warn(self, scene: Scene) -> None:
+        """GrimaldiWarning that names the worst point and the edge nearest to it, if there are any."""
+        if not self.count or self.source is None or self.point is None:
+            return
+        seen = outline(scene.before(self.source), self.source)
+        edge = f", beside {_nearest(scene, seen, self.point)}" if len(seen) else ""
+        place = ", ".join(f"{x:.9g}" for x in self.point)
+        warnings.warn(
+            f"tolerance {self.tolerance:g} is not reached at {self.count} of {self.of} points: the error of M may be "
+            f"{self.worst:.1g} at ({place}){edge}; `error` has it for each point",
+            GrimaldiWarning,
+            stacklevel=3,
+        )
+
+
+def _nearest(scene: Scene, seen: Outline, p: Vector) -> str:
+    """The outline segment nearest to a point, in words."""
+    span = seen.end - seen.start
+    t = np.clip(((p - seen.start) * span).sum(1) / np.maximum((span * span).sum(1), 1e-300), 0, 1)
+    i = int(np.linalg.norm(seen.start + t[:, None] * span - p, axis=1).argmin())
+    body = int(seen.body[i])
+    name = scene.bodies[body].name if body >= 0 else f"planar outline {-1 - body}"
+    ends = (", ".join(f"{x:.6g}" for x in end) for end in (seen.start[i], seen.end[i]))
+    return f"the edge of {name!r} from ({') to ('.join(ends)})"
+
+
+def warn_of_faint_light(U: NDArray[np.complex128], free: Reals, tolerance: float) -> None:
+    """GrimaldiWarning where at most points |U| is below a few tolerances of the light without obstacles.
+
+    U complex, free float64: (wavelength, group, point), `free` the sum of all sources' |U0|.
+    """
+    size, light = np.abs(U).sum(axis=1), free.sum(axis=1)
+    faint = (light > 0) & (size < FEW * tolerance * light)
+    if not faint.size or faint.mean() <= 0.5:
+        return
+    typical = float(np.median(size[faint] / light[faint]))
+    finer = 10.0 ** np.floor(np.log10(max(min(typical, tolerance) * 1e-2, 1e-12)))
+    warnings.warn(
+        f"the light is below {FEW * tolerance:g} of what it is without obstacles at {faint.sum()} of {faint.size} "
+        f"points, where tolerance={tolerance:g} leaves few digits; ask for tolerance={finer:g}",
+        GrimaldiWarning,
+        stacklevel=3,
+    )
