@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
 import drjit as dr
 import numpy as np
+from numpy.typing import NDArray
 
+from grimaldi.diffraction.boundary import boundary
 from grimaldi.diffraction.frame import incident
-from grimaldi.diffraction.model import Model, Options, Receivers
+from grimaldi.diffraction.fresnel_plane import fresnel_plane, planes
+from grimaldi.diffraction.model import Evaluate, Model, Options, Receivers
 from grimaldi.diffraction.screen import beyond
+from grimaldi.engine.points import at_points
 from grimaldi.outlines.extract import curve, outline
 from grimaldi.outlines.model import Reals
 from grimaldi.scene.model import Scene, Source
@@ -34,8 +38,37 @@ def propagate(
     """
     scene = scene.before(source)
     seen = outline(scene, source, sag=_sags(scene, source, options.tolerance / k, where))
-    factor = model(scene, source, seen, k, options)
+    return _wave(source, k, model(scene, source, seen, k, options))
 
+
+def propagate_all(
+    scene: Scene, source: Source, model: Model, k: float, options: Options, points: Reals
+) -> Iterator[tuple[Any, NDArray[np.complex128], NDArray[np.float64]]]:
+    """U of one source at all points (n, 3), in parts: which they are, U and |U_computed - U| there.
+
+    Points behind planar holes or masks that one transform serves go first (`fresnel_plane`), if the model is
+    `boundary` and `options.fast`; then the others, block by block.
+    """
+    left = np.ones(len(points), bool)
+    if options.fast and model is boundary:
+        before = scene.before(source)
+        for group in planes(before, source, points):
+            p = points[group.index]
+            factor = fresnel_plane(before, source, k, options, p, group.lattice)
+            if factor is not None:
+                (part,) = at_points(_wave(source, k, factor), scene, source, p, block=len(p))
+                yield group.index, *part[1:]
+                left[group.index] = False
+    if left.all():
+        yield from at_points(propagate(scene, source, model, k, options, points), scene, source, points)
+    elif left.any():
+        rest = np.flatnonzero(left)
+        wave = propagate(scene, source, model, k, options, points[rest])
+        for block, u, error in at_points(wave, scene, source, points[rest]):
+            yield rest[block], u, error
+
+
+def _wave(source: Source, k: float, factor: Evaluate) -> Callable[[Receivers], Wave]:
     ahead = None if source.aperture is None else beyond(source.aperture, source)
 
     def wave(receivers: Receivers) -> Wave:

@@ -17,9 +17,9 @@ BLOCK = 1 << 16  # points: about a second of work for a thousand segments, a few
 
 
 def at_points(
-    wave: Callable[[Receivers], Wave], scene: Scene, source: Source, points: NDArray[np.float64]
+    wave: Callable[[Receivers], Wave], scene: Scene, source: Source, points: NDArray[np.float64], block: int = BLOCK
 ) -> Iterator[tuple[slice, NDArray[np.complex128], NDArray[np.float64]]]:
-    """For each block of points (n, 3): which they are, U complex128 and |U_computed - U| float64 there."""
+    """For each `block` of points (n, 3): which they are, U complex128 and |U_computed - U| float64 there."""
     import drjit as dr
 
     from grimaldi.diffraction.arrays import types
@@ -28,10 +28,10 @@ def at_points(
 
     double = types(double=True)
     normals = surface_normals(scene, source)
-    for first in range(0, len(points), BLOCK):
-        block = slice(first, min(first + BLOCK, len(points)))
-        p = double.Vector(*(double.buffer(points[block, i]) for i in range(3)))
+    for first in range(0, len(points), block):
+        which = slice(first, min(first + block, len(points)))
+        p = double.Vector(*(double.buffer(points[which, i]) for i in range(3)))
         n = normals(p)
         u = wave(Receivers(p, n, dr.mask_t(p.x)(True)))
         dr.eval(u)
-        yield block, u.real.numpy() + 1j * u.imag.numpy(), u.error.numpy()
+        yield which, u.real.numpy() + 1j * u.imag.numpy(), u.error.numpy()
