@@ -53,12 +53,12 @@ def propagate_all(
     if options.fast and model is boundary:
         before = scene.before(source)
         for group in planes(before, source, points):
-            p = points[group.index]
+            p = points[group.which]
             factor = fresnel_plane(before, source, k, options, p, group.lattice)
             if factor is not None:
                 (part,) = at_points(_wave(source, k, factor), scene, source, p, block=len(p))
-                yield group.index, *part[1:]
-                left[group.index] = False
+                yield group.which, *part[1:]
+                left[group.which] = False
     if left.all():
         yield from at_points(propagate(scene, source, model, k, options, points), scene, source, points)
     elif left.any():

@@ -63,19 +63,19 @@ class Lattice(NamedTuple):
         return [0, self.columns - 1, last, last + self.columns - 1]
 
 
-def rounding(points: Reals) -> float:
-    """How far rounding may move points (n, 3) of these coordinates."""
-    return 2e-15 * max(points.max(initial=0), -points.min(initial=0))
+def rounding(points: Reals) -> Vector:
+    """How far (3,) rounding may move points (n, 3) of these coordinates."""
+    return 2e-15 * np.maximum(points.max(axis=0), -points.min(axis=0))
 
 
 def lattice(points: Reals) -> Lattice | None:
     """The lattice whose rows are the points (n, 3), but for rounding; None where there is none."""
-    slack = rounding(points)
     if len(points) < 4:
         return None
+    slack = rounding(points)
     ahead = points[: 1 << 15]
-    on = np.abs(ahead - ahead[0] - np.arange(len(ahead))[:, None] * (ahead[1] - ahead[0])).max(1) <= len(ahead) * slack
-    columns = len(on) if on.all() else int(on.argmin())
+    on = np.abs(ahead - ahead[0] - np.arange(len(ahead))[:, None] * (ahead[1] - ahead[0])) <= len(ahead) * slack
+    columns = len(on) if on.all() else int(on.all(axis=1).argmin())
     if columns < 2 or len(points) % columns or len(points) < 2 * columns:
         return None
     rows = points.reshape(-1, columns, 3)
@@ -83,7 +83,7 @@ def lattice(points: Reals) -> Lattice | None:
     for axis in range(3):
         off = rows[:, :, axis] - (rows[0, 0, axis] + np.arange(columns) * u[axis])
         off -= (np.arange(len(rows)) * v[axis])[:, None]
-        if max(off.max(), -off.min()) > slack:
+        if max(off.max(), -off.min()) > slack[axis]:
             return None
     return Lattice(len(rows), columns, u, v)
 
@@ -132,7 +132,7 @@ class Plane:
     screen: Screen
     p0: Vector  # (3,)
     b: float  # how far the points reach from p0
-    uneven: float  # how far they may lie off the plane and the lattice
+    off: tuple[float, float]  # how far they may lie off the lattice in the plane, and off the plane
     lattice: Lattice | None
 
     @property
@@ -180,13 +180,16 @@ class Plane:
         hull = points if grid is None else points[grid.corners]
         p0 = 0.5 * (points.min(0) + points.max(0)) if grid is None else points[grid.middle]
         b = float(np.linalg.norm(hull - p0, axis=1).max())
-        return Plane(screen, p0, b, float(np.ptp(hull @ screen.normal)) + rounding(hull), grid)
+        slack = rounding(hull)
+        beside = float(np.linalg.norm(np.abs(screen.axes) @ slack))
+        off = float(np.ptp(hull @ screen.normal) + np.abs(screen.normal) @ slack)
+        return Plane(screen, p0, b, (beside, off), grid)
 
 
 class Group(NamedTuple):
     """Points of one plane: which they are, and the lattice that they form, if any."""
 
-    index: slice | Integers
+    which: slice | Integers
     lattice: Lattice | None
 
 
@@ -198,7 +201,7 @@ def planes(scene: Scene, source: Source, points: Reals) -> list[Group]:
     grid = lattice(points)
     hull = points if grid is None else points[grid.corners]
     heights = hull @ screen.normal - screen.x0 @ screen.normal
-    slack = 4 * rounding(hull)
+    slack = 4 * float(np.abs(screen.normal) @ rounding(hull))
     if np.ptp(heights) <= slack:
         return [Group(slice(None), grid)] if heights.min() > 0 else []
     if grid is not None:
@@ -238,7 +241,8 @@ def remainder(plane: Plane, area: float, covers: float) -> Remainder:
         |ψ| <= 3kab/h³ [w0 (a+b)/2 + a²/6 + ab/4 + b²/6],   |∇ψ| <= 3kb/h³ [w0 (a + b/2) + a²/2 + ab/2 + b²/6]
 
     and |η| <= 4ab/h². With K dA = -dφ d(C e^{ikΔ})/2π (THEORY eq. 4) integrated by parts along the azimuths of the
-    ray, the error is at most (∮|dφ|/2π) (2|ψ| + 2a|∇ψ| + 4|η|); `covers` is at least ∮|dφ|/2π, as the outlines' total turning is ≥ ∮|dφ|.
+    ray, the error is at most (∮|dφ|/2π) (2|ψ| + 2a|∇ψ| + 4|η|); `covers`, the outlines' total turning over 2π, is
+    no less than ∮|dφ|/2π.
     Where holes are small ∫|K| dA (|ψ| + |η|) is less.
     """
     screen = plane.screen
@@ -254,8 +258,9 @@ def remainder(plane: Plane, area: float, covers: float) -> Remainder:
     )
     powers = plane.b ** np.arange(1, 4)
     c = by_rim if by_rim @ powers < by_area @ powers else by_area
-    off = 4 * covers * k * plane.uneven * (plane.slope(plane.b) + a * (a + 2 * plane.b + w0) / h**2)
-    return Remainder(off, *c.tolist())
+    beside, off = plane.off
+    c0 = 4 * covers * k * (beside * plane.slope(plane.b) + off * a * (a + 2 * plane.b + w0) / h**2)
+    return Remainder(float(c0), *c.tolist())
 
 
 # ---------------------------------------------------------------- quadrature
@@ -278,7 +283,8 @@ class Patches(NamedTuple):
         if self.ellipse:
             reach = float(np.linalg.norm(np.stack([self.first[0], self.second[0]]), 2))
             n = 2 * count(slope * reach, share)  # the trapezoid rule is exact to half the degree of Gauss's
-            return Rule(gauss(0.5 * slope * reach, share), (np.arange(n) * (2 * np.pi / n), np.full(n, 1 / n)))
+            round_ = np.arange(n, dtype=np.float64) * (2 * np.pi / n), np.full(n, 1 / n)
+            return Rule(gauss(0.5 * slope * reach, share), round_)
         ends = np.stack([self.first, self.first + self.second])
         reach, side = (float(np.linalg.norm(v, axis=-1).max()) for v in (ends, self.second))
         return Rule(gauss(0.5 * slope * reach, share), gauss(0.5 * slope * side, share))
@@ -327,12 +333,12 @@ def count(half: float, share: float) -> int:
 
 
 @lru_cache(maxsize=64)
-def gauss(half: float, share: float) -> tuple[Reals, Reals]:
+def gauss(half: float, share: float) -> tuple[Any, Any]:
     """Nodes and weights on 0..1, in panels of at most 60 radians either side."""
     panels = int(np.ceil(max(half, 1.0) / 60))
     x, w = np.polynomial.legendre.leggauss(count(half / panels, share))
-    nodes = (np.arange(panels)[:, None] + 0.5 * (x + 1)) / panels
-    return nodes.ravel(), np.tile(0.5 * w / panels, panels)
+    middles = np.arange(panels)[:, None] + 0.5
+    return ((middles + 0.5 * x) / panels).ravel(), np.tile(0.5 * w / panels, panels)
 
 
 def nodes(part: Patches, rule: Rule) -> tuple[Reals, Reals]:
@@ -393,17 +399,16 @@ def sums(plane: Plane, points: Reals, x: Reals, c: NDArray[np.complex128], eps: 
     import finufft
 
     axes, grid = plane.screen.axes, plane.lattice
-    x = x @ (-plane.screen.k * axes.T @ plane.B)  # (m, 2)
+    to_phase = -plane.screen.k * axes.T @ plane.B  # (3, 2)
+    result: Any
     if grid is None:
-        y = (points - plane.p0) @ axes.T
-        return finufft.nufft2d3(*_columns(x), c, *_columns(y), eps=eps, isign=1)
-    x = x @ axes @ np.stack([grid.v, grid.u], axis=1)
-    shape = (grid.rows, grid.columns)
-    return finufft.nufft2d1(*_columns(x), c, shape, eps=eps, isign=1, upsampfac=upsampling(eps)).ravel()
-
-
-def _columns(x: Reals) -> list[Reals]:
-    return [np.ascontiguousarray(column) for column in x.T]
+        (x1, x2), (y1, y2) = (np.einsum("ji,mj->im", a, v) for a, v in ((to_phase, x), (axes.T, points - plane.p0)))
+        result = finufft.nufft2d3(x1, x2, c, y1, y2, eps=eps, isign=1)
+    else:
+        x1, x2 = np.einsum("ji,mj->im", to_phase @ axes @ np.stack([grid.v, grid.u], axis=1), x)
+        shape = grid.rows, grid.columns
+        result = finufft.nufft2d1(x1, x2, c, shape, eps=eps, isign=1, upsampfac=upsampling(eps))
+    return result.ravel()
 
 
 def upsampling(eps: float) -> float:
@@ -433,9 +438,8 @@ def fresnel_plane(
     left = remainder(plane, area, covers)
     # finufft's error is what it would return at its aliases, times eps: |M| <= 1 + ∮|dφ|/2π
     eps = TRANSFORM * options.tolerance / (EXCESS * min(mass, 1 + covers))
-    numerical = (QUADRATURE + TRANSFORM) * options.tolerance + 1e-15 * (
-        1 + k * plane.slope(plane.b) * (screen.a + plane.b)
-    )
+    phase = k * plane.slope(plane.b) * (screen.a + plane.b)
+    numerical = (QUADRATURE + TRANSFORM) * options.tolerance + 1e-15 * (1 + phase)
     if LEAST * left(plane.b) + numerical > options.tolerance or eps < FINEST:
         return None
     # the nodes serve finufft's strongest aliases too, which lie within 2b
@@ -490,13 +494,18 @@ class Opening:
         at = points[chosen] - screen.x0
         p = V(*(dr.gather(F, double.buffer(column), point) for column in at.T))
         re, im = kernel(screen, x, p)
-        weight = dr.gather(F, double.buffer(self.weights), node)
-        exact_re, exact_im = dr.block_sum(weight * re, m), dr.block_sum(weight * im, m)
+        w, c_re, c_im = (
+            dr.gather(F, double.buffer(values), node)
+            for values in (self.weights, self.factored.real, self.factored.imag)
+        )
+        exact = _complex((dr.block_sum(w * re, m), dr.block_sum(w * im, m)))
         y = points[chosen] - self.plane.p0
-        across = self.x @ (-screen.k * screen.axes.T @ self.plane.B)
-        ratio = np.array([c @ np.exp(1j * (across @ q)) for c, q in ((self.factored, q) for q in y @ screen.axes.T)])
+        B = -screen.k * screen.axes.T @ self.plane.B @ screen.axes
+        q = V(*(dr.gather(F, double.buffer(column), point) for column in (y @ B.T).T))
+        sin, cos = sincos(dr.dot(x, q))
+        factored = _complex((dr.block_sum(c_re * cos - c_im * sin, m), dr.block_sum(c_re * sin + c_im * cos, m)))
         outer = _complex(kernel(screen, constant(V, np.zeros(3)), V(*map(double.buffer, at.T))))
-        off = np.abs(ratio * outer - _complex((exact_re, exact_im)))
+        off = np.abs(factored * outer - exact)
         return float((off / bound(np.linalg.norm(y, axis=1))).max())
 
 
