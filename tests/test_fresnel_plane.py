@@ -103,24 +103,24 @@ def test_a_circle_on_its_axis(number, acts):
 def test_the_bound_is_kept_wherever_it_acts(acts):
     random = np.random.default_rng(7)
     served = 0
-    for _ in range(24):
+    for _ in range(14):
         a, z = 10 ** random.uniform(1.5, 2.5), 10 ** random.uniform(3.5, 6)
-        b, tolerance = a * 10 ** random.uniform(-1, 0.5), 10 ** random.uniform(-5, -2)
+        b, tolerance = a * 10 ** random.uniform(-1, 0.5), random.choice([1e-5, 1e-4, 1e-3])
         hole = random.choice([name for name in holes(1) if "circle" not in name and "ellipse" not in name])
         light = random.choice(list(lights(1, 0)))
         tilt = random.uniform(0, 0.1)
         scene = grimaldi.load({"type": "scene", "light": lights(z, tilt)[light]}, outlines=holes(a)[hole])
         at = {"plane": 0, "oblique plane": tilt * z, "point": -tilt * z}[light]
-        points = grid(b, z, (12, 12), at=(at, -at / 2 if light == "oblique plane" else 0.3 * at))
+        points = grid(b, z, (7, 7), at=(at, -at / 2 if light == "oblique plane" else 0.3 * at))
         acts.clear()
-        ours, line = both(scene, points, tolerance, line_tolerance=1e-3 * tolerance)
+        ours, line = both(scene, points, tolerance, line_tolerance=1e-7)
         if acts != [True]:
             continue
         served += 1
         u0 = 1 if light != "point" else z / np.linalg.norm(points - [tilt * z, 0.3 * tilt * z, -z], axis=1)
         assert (abs(ours.U.values - line.U.values)[0, 0] <= ours.error.values[0, 0]).all(), (hole, light, a, z, b)
         assert (ours.error.values[0, 0] / u0 <= tolerance * (1 + 1e-12)).all()
-    assert served >= 6
+    assert served >= 4
 
 
 def test_it_leaves_alone_what_it_cannot_do_within_the_tolerance(acts):

@@ -402,10 +402,12 @@ def sums(plane: Plane, points: Reals, x: Reals, c: NDArray[np.complex128], eps: 
     to_phase = -plane.screen.k * axes.T @ plane.B  # (3, 2)
     result: Any
     if grid is None:
-        (x1, x2), (y1, y2) = (np.einsum("ji,mj->im", a, v) for a, v in ((to_phase, x), (axes.T, points - plane.p0)))
+        (x1, x2), (y1, y2) = (
+            np.einsum("ji,mj->im", a, v, order="C") for a, v in ((to_phase, x), (axes.T, points - plane.p0))
+        )
         result = finufft.nufft2d3(x1, x2, c, y1, y2, eps=eps, isign=1)
     else:
-        x1, x2 = np.einsum("ji,mj->im", to_phase @ axes @ np.stack([grid.v, grid.u], axis=1), x)
+        x1, x2 = np.einsum("ji,mj->im", to_phase @ axes @ np.stack([grid.v, grid.u], axis=1), x, order="C")
         shape = grid.rows, grid.columns
         result = finufft.nufft2d1(x1, x2, c, shape, eps=eps, isign=1, upsampfac=upsampling(eps))
     return result.ravel()
