@@ -39,7 +39,7 @@ SAMPLES, SAFETY = 16, 2.5  # points where the error is measured, and what it may
 MOST_NODES = 1 << 23
 MOST_CELLS = 1 << 26  # of the FFT
 
-# Seconds on two cores of 2024; only their ratios decide.
+# Rough seconds on two cores; only which is larger matters, and mostly by far.
 PAIR, PAIR_DOUBLE = 4e-9, 1.2e-8  # a point and a segment of the line integral
 SPREAD, CELL, CALL = 1e-9, 5e-9, 5e-3  # a node or target and a cell that it covers; a cell of the FFT; the rest
 
@@ -395,7 +395,7 @@ def kernel(screen: Screen, x: Any, p: Any) -> tuple[Any, Any]:
 
 
 def sums(plane: Plane, points: Reals, x: Reals, c: NDArray[np.complex128], eps: float) -> NDArray[np.complex128]:
-    """Σ c e^{-ik y·Bx} at the points, y being points - p0, to eps Σ|c|; x (m, 3) from x0."""
+    """Σ c e^{-ik y·Bx} at the points, y being points - p0, to about eps of their size; x (m, 3) from x0."""
     import finufft
 
     axes, grid = plane.screen.axes, plane.lattice
