@@ -66,9 +66,9 @@ def _nearest(scene: Scene, seen: Outline, p: Vector) -> str:
 def warn_of_faint_light(U: NDArray[np.complex128], free: Reals, tolerance: float) -> None:
     """GrimaldiWarning where at most points |U| is below a few tolerances of the light without obstacles.
 
-    U complex, free float64: (wavelength, group, point), `free` the sum of all sources' |U0|.
+    U (wavelength, group, point); free (wavelength, point), the sum of all sources' |U0|.
     """
-    size, light = np.abs(U).sum(axis=1), free.sum(axis=1)
+    size, light = np.abs(U).sum(axis=1), free
     faint = (light > 0) & (size < FEW * tolerance * light)
     if not faint.size or faint.mean() <= 0.5:
         return

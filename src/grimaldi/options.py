@@ -23,6 +23,7 @@ def checked_options(
     n: Any = None,
     weights: Any = "report",
     epsilon: Any = None,
+    fast: Any = True,
 ) -> Options:
     """The options of every model; InputError names the one that is wrong."""
     from grimaldi.diffraction.model import NYQUIST, Options, Precision, Weights
@@ -39,7 +40,9 @@ def checked_options(
         raise InputError(f"weights: {weights!r} is unknown; {did_you_mean(weights, get_args(Weights))}")
     if n is not None and n != NYQUIST and (not isinstance(n, int) or isinstance(n, bool) or not 1 <= n <= MOST):
         raise InputError(f"n: {n!r} is no number of sources; give an integer from 1 to {MOST}, or {NYQUIST!r}")
-    return Options(tolerance, precision, bool(occlusion), n, weights, _positive("epsilon", epsilon))
+    if not isinstance(fast, bool):
+        raise InputError(f"fast: {fast!r} is neither True nor False; give one of these")
+    return Options(tolerance, precision, bool(occlusion), n, weights, _positive("epsilon", epsilon), fast)
 
 
 def _positive(name: str, value: Any) -> float | None:
@@ -66,6 +69,7 @@ def describe(scene: Scene, *, diffraction: str, interference: bool, options: Opt
         "n": "" if options.n is None else options.n,
         "weights": options.weights,
         "epsilon": "" if options.epsilon is None else options.epsilon,
+        "fast": str(options.fast).lower(),
         "grimaldi": version("grimaldi"),
         "mitsuba": version("mitsuba"),
     }

@@ -29,6 +29,7 @@ def field(
     n: int | Literal["nyquist"] | None = None,
     weights: Literal["report", "length", "kernel"] = "report",
     epsilon: float | None = None,
+    fast: bool = True,
     **unknown: Any,
 ) -> xr.Dataset:
     """The complex field of a scene's sources at points.
@@ -52,6 +53,9 @@ def field(
             "boundary" as n grows).
         epsilon: how far beside an edge the silhouette test of "report" looks [scene units]; 2e-4 of the body's size
             unless given.
+        fast: whether "boundary" may sum points on a plane behind holes or masks by one non-uniform FFT (Barnett,
+            JATIS 7(2) 021211) where the bound of its error is within `tolerance` and it is expected to be faster.
+            False: always along the outlines.
 
     Returns:
         Dataset with `U` complex128 (wavelength, group, point) by eq. 1-2 and 4-6, `intensity` float64 (point) by
@@ -59,21 +63,24 @@ def field(
 
     Raises:
         InputError: one line naming what is wrong and what to do.
+
+    Warns:
+        GrimaldiWarning: the tolerance is not reached somewhere; most of the light is fainter than a few tolerances.
     """
     import xarray as xr
 
+    from grimaldi.accuracy import Misses, warn_of_faint_light
     from grimaldi.coherence import groups, intensity, separated
     from grimaldi.conventions import check_options, parse_wavelengths
     from grimaldi.diffraction import model
-    from grimaldi.engine.points import at_points
     from grimaldi.engine.progress import progress
-    from grimaldi.propagate import propagate
+    from grimaldi.propagate import propagate_all
     from grimaldi.scene import load
     from grimaldi.scene.checking import require_sources
 
     check_options(unknown, signature(field).parameters)
     p = checked_points(points)
-    options = checked_options(tolerance, precision, occlusion, n, weights, epsilon)
+    options = checked_options(tolerance, precision, occlusion, n, weights, epsilon, fast)
     factor = model(diffraction)
     loaded = load(scene, scene_unit=scene_unit)
     wavelengths = parse_wavelengths(loaded.wavelength if wavelength is None else wavelength, loaded.unit)
@@ -83,15 +90,21 @@ def field(
     names = groups(sources)
     U = np.zeros((len(wavelengths), len(names), len(p)), complex)
     error = np.zeros(U.shape)
+    free = np.zeros((len(wavelengths), len(p)))
+    misses = Misses(options.tolerance)
     with progress(len(wavelengths) * len(sources) * len(p), "field") as advance:
         for i, length in enumerate(wavelengths):
             for source in sources:
-                wave = propagate(loaded, source, factor, 2 * np.pi / length, options, p)
                 of = i, names.index(source.group)
-                for block, u, du in at_points(wave, loaded, source, p):
-                    U[*of, block] += u
-                    error[*of, block] += du
-                    advance(len(u))
+                for part in propagate_all(loaded, source, factor, 2 * np.pi / length, options, p):
+                    U[*of, part.which] += part.U
+                    error[*of, part.which] += part.error
+                    free[i, part.which] += part.free
+                    misses.add(source, p[part.which], part.error, part.free)
+                    advance(len(part.U))
+    if diffraction == "boundary":
+        misses.warn(loaded)
+        warn_of_faint_light(U, free, options.tolerance)
     data = {
         "U": (("wavelength", "group", "point"), U),
         "intensity": ("point", intensity(U)),

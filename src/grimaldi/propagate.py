@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import Any, NamedTuple
 
 import drjit as dr
 import numpy as np
 
+from grimaldi.diffraction.boundary import boundary
 from grimaldi.diffraction.frame import incident
-from grimaldi.diffraction.model import Model, Options, Receivers
+from grimaldi.diffraction.fresnel_plane import fresnel_plane, planes
+from grimaldi.diffraction.model import Evaluate, Model, Options, Receivers
 from grimaldi.diffraction.screen import beyond
+from grimaldi.engine.points import Part, at_points
 from grimaldi.outlines.candidate import least_sag
 from grimaldi.outlines.extract import curve, is_curved, outline
 from grimaldi.outlines.model import Reals
@@ -19,11 +22,12 @@ from grimaldi.scene.model import Scene, Source
 
 
 class Wave(NamedTuple):
-    """U and |U_computed - U| at receivers, Float64 Dr.Jit arrays."""
+    """U, |U_computed - U| and |U0| at receivers, Float64 Dr.Jit arrays."""
 
     real: Any
     imag: Any
     error: Any
+    free: Any
 
 
 def propagate(
@@ -37,8 +41,37 @@ def propagate(
     scene = scene.before(source)
     sags, detour = _sags(scene, source, options.tolerance / k, where)
     seen = replace(outline(scene, source, sag=sags), detour=detour)
-    factor = model(scene, source, seen, k, options)
+    return _wave(source, k, model(scene, source, seen, k, options))
 
+
+def propagate_all(
+    scene: Scene, source: Source, model: Model, k: float, options: Options, points: Reals
+) -> Iterator[Part]:
+    """U of one source at all points (n, 3), in parts.
+
+    Points behind planar holes or masks that one transform serves go first (`fresnel_plane`), if the model is
+    `boundary` and `options.fast`; then the others, block by block.
+    """
+    left = np.ones(len(points), bool)
+    if options.fast and model is boundary:
+        before = scene.before(source)
+        for group in planes(before, source, points):
+            p = points[group.which]
+            factor = fresnel_plane(before, source, k, options, p, group.lattice)
+            if factor is not None:
+                (part,) = at_points(_wave(source, k, factor), scene, source, p, block=len(p))
+                yield part._replace(which=group.which)
+                left[group.which] = False
+    if left.all():
+        yield from at_points(propagate(scene, source, model, k, options, points), scene, source, points)
+    elif left.any():
+        rest = np.flatnonzero(left)
+        wave = propagate(scene, source, model, k, options, points[rest])
+        for part in at_points(wave, scene, source, points[rest]):
+            yield part._replace(which=rest[part.which])
+
+
+def _wave(source: Source, k: float, factor: Evaluate) -> Callable[[Receivers], Wave]:
     ahead = None if source.aperture is None else beyond(source.aperture, source)
 
     def wave(receivers: Receivers) -> Wave:
@@ -48,7 +81,7 @@ def propagate(
         m = factor(receivers)
         F = type(modulus)
         re, im = F(m.real), F(m.imag)
-        return Wave(modulus * (cos * re - sin * im), modulus * (cos * im + sin * re), modulus * F(m.error))
+        return Wave(modulus * (cos * re - sin * im), modulus * (cos * im + sin * re), modulus * F(m.error), modulus)
 
     return wave
 
@@ -71,8 +104,8 @@ def _sags(scene: Scene, source: Source, path: float, where: Reals) -> tuple[list
         v = where - centre
         d = np.linalg.norm(v - np.einsum("ij,ij->i", v, a)[:, None] * a, axis=1) + radius
         z2 = np.maximum(np.linalg.norm(v, axis=1) - radius, 0.5 * radius)
-        slope = min(float((d * (1 / z1 + 1 / z2)).max(initial=1e-3)), 2.0)
-        sags.append(min(path / slope, 0.01 * radius))
+        slope = min(float((d * (1 / z1 + 1 / z2)).max(initial=0.0)), 2.0)
+        sags.append(min(path / max(slope, 1e-3), 0.01 * radius))
         if is_curved(shape):
             detour = max(detour, slope * max(sags[-1], least_sag(radius)))
     return sags, detour

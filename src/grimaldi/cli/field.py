@@ -32,6 +32,7 @@ def field(
     n: options.N = None,
     weights: options.Weights = None,
     epsilon: options.Epsilon = None,
+    fast: options.Fast = None,
     variant: options.Variant = None,
 ) -> None:
     """Compute the complex field of SCENE at points."""
@@ -52,6 +53,7 @@ def field(
         n=options.number(n),
         weights=weights,
         epsilon=epsilon,
+        fast=fast,
     )
     options.set_variant(variant)
 

@@ -48,6 +48,12 @@ Weights = Annotated[
 Epsilon = Annotated[
     float | None, typer.Option(help="Of the report's silhouette test, in scene units.", metavar="LENGTH")
 ]
+Fast = Annotated[
+    bool | None,
+    typer.Option(
+        "--fast/--no-fast", help="Whether points on a plane behind holes may be summed by one FFT, within tolerance."
+    ),
+]
 Variant = Annotated[
     str | None, typer.Option(help="Mitsuba's variant, such as llvm_ad_rgb.  [default: the best that works]")
 ]

@@ -19,7 +19,8 @@ class Options:
     """What every model is asked for.
 
     tolerance: |M_computed - M| allowed for each source and point; precision: "auto" or "double";
-    occlusion: whether bodies block the way from an outline to a point.
+    occlusion: whether bodies block the way from an outline to a point; fast: whether `field` may take one transform
+    for all points of a plane behind holes or masks.
 
     Of the models that sum over sources: n is how many an edge (`huygens`; "nyquist": λ/2 apart) or a point
     (`area`) gets, None for the model's own choice; `huygens` has `weights`, and the distance epsilon [scene units]
@@ -32,6 +33,7 @@ class Options:
     n: int | Literal["nyquist"] | None = None
     weights: Weights = "report"
     epsilon: float | None = None
+    fast: bool = True
 
 
 class Receivers(NamedTuple):

@@ -63,8 +63,8 @@ class Rule(NamedTuple):
 # Least tolerance, K, nodes a panel, its width, nodes of a tail, and the median of a tail's error relative to it at K
 # over random geometries; the largest errors (benchmarks/segment_rules.py) are below a tenth of the tolerance.
 RULES = (
-    (5e-3, 3.0, 4, 1.2, 2, 5e-2),
-    (5e-4, 4.0, 5, 1.2, 3, 6e-3),
+    (5e-3, 3.0, 4, 1.2, 3, 2e-2),
+    (5e-4, 4.0, 5, 1.2, 4, 2e-3),
     (5e-5, 5.0, 8, 1.4, 4, 6e-4),
     (5e-7, 6.0, 10, 1.0, 6, 1.4e-5),
     (5e-9, 8.0, 14, 1.0, 8, 1.1e-7),

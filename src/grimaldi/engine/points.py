@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,10 +16,19 @@ if TYPE_CHECKING:
 BLOCK = 1 << 16  # points: about a second of work for a thousand segments, a few hundred bytes each
 
 
+class Part(NamedTuple):
+    """Some of the points: an index of them, U complex128, |U_computed - U| and |U0| float64 there."""
+
+    which: Any
+    U: NDArray[np.complex128]
+    error: NDArray[np.float64]
+    free: NDArray[np.float64]
+
+
 def at_points(
-    wave: Callable[[Receivers], Wave], scene: Scene, source: Source, points: NDArray[np.float64]
-) -> Iterator[tuple[slice, NDArray[np.complex128], NDArray[np.float64]]]:
-    """For each block of points (n, 3): which they are, U complex128 and |U_computed - U| float64 there."""
+    wave: Callable[[Receivers], Wave], scene: Scene, source: Source, points: NDArray[np.float64], block: int = BLOCK
+) -> Iterator[Part]:
+    """One source's wave at points (n, 3), `block` of them after the other."""
     import drjit as dr
 
     from grimaldi.diffraction.arrays import types
@@ -28,10 +37,10 @@ def at_points(
 
     double = types(double=True)
     normals = surface_normals(scene, source)
-    for first in range(0, len(points), BLOCK):
-        block = slice(first, min(first + BLOCK, len(points)))
-        p = double.Vector(*(double.buffer(points[block, i]) for i in range(3)))
+    for first in range(0, len(points), block):
+        which = slice(first, min(first + block, len(points)))
+        p = double.Vector(*(double.buffer(points[which, i]) for i in range(3)))
         n = normals(p)
         u = wave(Receivers(p, n, dr.mask_t(p.x)(True)))
         dr.eval(u)
-        yield block, u.real.numpy() + 1j * u.imag.numpy(), u.error.numpy()
+        yield Part(which, u.real.numpy() + 1j * u.imag.numpy(), u.error.numpy(), u.free.numpy())
