@@ -35,7 +35,7 @@ class Settings:
     interference: bool = True
     tolerance: float = 1e-3
     precision: str = "auto"
-    occlusion: bool = True
+    occlusion: bool | str = True
     n: int | str | None = None
     weights: str = "report"
     epsilon: float | None = None

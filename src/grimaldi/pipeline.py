@@ -25,7 +25,7 @@ def field(
     interference: bool = True,
     tolerance: float = 1e-3,
     precision: Literal["auto", "double"] = "auto",
-    occlusion: bool = True,
+    occlusion: bool | Literal["graded", "binary", "none"] = True,
     n: int | Literal["nyquist"] | None = None,
     weights: Literal["report", "length", "kernel"] = "report",
     epsilon: float | None = None,
@@ -45,7 +45,8 @@ def field(
         tolerance: |M_computed - M| allowed for each source and point, where U = U0 M: the error of integrating the
             stated model, not of the model.
         precision: "auto" (Float32 sums where the tolerance allows), or "double".
-        occlusion: whether bodies block the way from an outline to a point.
+        occlusion: how bodies block the way from an outline to a point. True or "graded": of "boundary", by Fresnel's
+            factor where it grazes another silhouette; "binary": by yes or no; False or "none": not at all.
         n: sources an edge of "huygens" (3 unless given; "nyquist": at most λ/2 apart); random samples a point of
             "area", which unless given integrates by quadrature.
         weights: of the sources of "huygens": "report" (equal strength), "length" or "kernel" (which converges to

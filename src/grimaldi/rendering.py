@@ -35,7 +35,7 @@ def render(
     interference: bool | None = None,
     tolerance: float | None = None,
     precision: Literal["auto", "double"] | None = None,
-    occlusion: bool | None = None,
+    occlusion: bool | Literal["graded", "binary", "none"] | None = None,
     n: int | Literal["nyquist"] | None = None,
     weights: Literal["report", "length", "kernel"] | None = None,
     epsilon: float | None = None,

@@ -15,12 +15,14 @@ from grimaldi.diffraction import none
 from grimaldi.diffraction.arrays import types
 from grimaldi.diffraction.edges import Sum, body_sum, lit_share, planar_sum
 from grimaldi.diffraction.frame import frame
+from grimaldi.diffraction.grazing import Chords, chords, near
 from grimaldi.diffraction.model import Evaluate, Factor, Options, Receivers
 from grimaldi.diffraction.occlusion import rays
 from grimaldi.diffraction.screen import beyond
 from grimaldi.diffraction.segment import Rule
 from grimaldi.diffraction.table import Table, needs_double, table
 from grimaldi.outlines.model import Outline
+from grimaldi.outlines.silhouettes import loops, same_loop, silhouettes
 from grimaldi.scene.model import Scene, Source
 
 HIDDEN_END = 0.5  # of the tolerance: what an untested X→P may at most leave behind
@@ -33,11 +35,16 @@ def boundary(scene: Scene, source: Source, outline: Outline, k: float, options: 
     """
     if len(outline) == 0:
         return none.none(scene, source, outline, k, options)
-    tab = table(outline, types(needs_double(outline, k, options)))
+    arrays = types(needs_double(outline, k, options))
     rule = Rule.of(options.tolerance)
     if scene.screen:
-        return _planar(scene, source, tab, k, rule)
-    return _bodies(scene, source, tab, outline.sag, k, rule, options)
+        return _planar(scene, source, table(outline, arrays), k, rule)
+    if options.occlusion != "graded":
+        return _bodies(scene, source, table(outline, arrays), None, outline.sag, k, rule, options)
+    whole = silhouettes(scene, source)
+    loop = loops(whole)
+    tab = table(outline, arrays, loop=same_loop(outline, whole, loop))
+    return _bodies(scene, source, tab, chords(whole, loop, tab.centre, arrays), outline.sag, k, rule, options)
 
 
 def _factor(tab: Table, rule: Rule, geometric: Any, sign: int, sums: Sum) -> Factor:
@@ -63,7 +70,16 @@ def _planar(scene: Scene, source: Source, tab: Table, k: float, rule: Rule) -> E
     return evaluate
 
 
-def _bodies(scene: Scene, source: Source, tab: Table, sag: float, k: float, rule: Rule, options: Options) -> Evaluate:
+def _bodies(
+    scene: Scene,
+    source: Source,
+    tab: Table,
+    grazing: Chords | None,
+    sag: float,
+    k: float,
+    rule: Rule,
+    options: Options,
+) -> Evaluate:
     probe = rays(scene, source, sag)
 
     def evaluate(receivers: Receivers) -> Factor:
@@ -74,7 +90,8 @@ def _bodies(scene: Scene, source: Source, tab: Table, sag: float, k: float, rule
             k,
             rule,
             HIDDEN_END * options.tolerance,
-            probe if options.occlusion else None,
+            probe if options.occlusion != "none" else None,
+            None if grazing is None else near(fr, grazing, k, receivers),
             receivers,
         )
         return _factor(tab, rule, lit_share(fr, tab, nearest, probe, receivers), 1, sums)

@@ -12,6 +12,7 @@ import mitsuba as mi
 import numpy as np
 
 from grimaldi.diffraction.frame import Frame, constant
+from grimaldi.diffraction.grazing import FAINT, Near, grazed, other_than
 from grimaldi.diffraction.model import Receivers
 from grimaldi.diffraction.occlusion import Rays
 from grimaldi.diffraction.segment import Line, Rule, detour, line, segment_wave, stationary
@@ -108,8 +109,8 @@ def sounds(fr: Frame, piece: Piece, n: Any) -> Any:
     return above & behind
 
 
-def _matters(fr: Frame, piece: Piece, e: Any, k: float, share: float) -> Any:
-    """Whether the chain's wave, cut off somewhere on this piece, would exceed `share` of M.
+def _cut_off(fr: Frame, piece: Piece, e: Any, k: float) -> Any:
+    """|M| that the chain's wave, cut off somewhere on this piece, would at most leave.
 
     The end of a chain sends |M| = √D / (4π (D + w) √w), D = kΔs at the stationary point, w = k(Δ - Δs).
     """
@@ -118,7 +119,7 @@ def _matters(fr: Frame, piece: Piece, e: Any, k: float, share: float) -> Any:
     D, _, _, _ = detour(fr, ln, st.t, ln.eqq * (dr.square(st.t - ln.td) + ln.w * ln.w))
     D = dr.maximum(k * D, 0.01)
     w = dr.maximum(k * st.growth(dr.maximum(dr.abs(st.t) - piece.reach, 0)), 0.1)
-    return dr.sqrt(D) > 4 * np.pi * share * (D + w) * dr.sqrt(w)
+    return dr.sqrt(D) / (4 * np.pi * (D + w) * dr.sqrt(w))
 
 
 def closest(fr: Frame, seg: Segment, ln: Line) -> Any:
@@ -133,9 +134,20 @@ def closest(fr: Frame, seg: Segment, ln: Line) -> Any:
 
 @dr.syntax
 def body_sum(
-    fr: Frame, tab: Table, k: float, rule: Rule, share: float, probe: Rays | None, receivers: Receivers
+    fr: Frame,
+    tab: Table,
+    k: float,
+    rule: Rule,
+    share: float,
+    probe: Rays | None,
+    beside: Near | None,
+    receivers: Receivers,
 ) -> tuple[Sum, Nearest]:
-    """The sum over the outlines of bodies, piece by piece, each only where it reaches the receiver."""
+    """The sum over the outlines of bodies, piece by piece, each as far as it reaches the receiver.
+
+    What would add less than `share` of M goes unasked; without a probe all does. Without silhouettes
+    near by a piece reaches the receiver or does not.
+    """
     F = tab.types.Float
     U = dr.uint32_array_t(F)
     n = tab.types.Vector(receivers.n)
@@ -149,19 +161,34 @@ def body_sum(
     while receivers.active & (i < tab.n_pieces):
         piece = tab.piece(i)
         acts = sounds(fr, piece, n)
+        visible = dr.mask_t(F)(acts)
+        past_real, past_imag = F(0), F(0)
         if dr.hint(probe is not None, mode="scalar"):
             assert probe is not None
-            tested = acts & _matters(fr, piece, tab.segment(piece.first).e, k, share)
+            left = _cut_off(fr, piece, tab.segment(piece.first).e, k)
+            tested = acts & (left > share)
             if tested:
                 x = mi.Point3f(piece.middle + constant(tab.types.Vector, tab.centre))
-                acts = acts & probe.reaches(x, piece, p, tested)
+                visible = acts & probe.reaches(x, piece, p, tested)
+            if dr.hint(beside is not None, mode="scalar"):
+                assert beside is not None
+                loop, close = other_than(beside, piece)
+                close &= tested & (left > FAINT)
+                if close:
+                    past_real, past_imag = grazed(fr, beside.silhouettes, piece, loop, visible, k, close)
+            acts = visible | (past_real != 0) | (past_imag != 0)
         j = U(piece.first)
         while acts & (j < piece.end):
             seg = tab.segment(j)
-            re, im, er, ei, _ = segment_wave(fr, seg.X0, seg.e, seg.length, k, rule, acts)
+            re, im, er, ei, kappa = segment_wave(fr, seg.X0, seg.e, seg.length, k, rule, acts)
+            if dr.hint(beside is not None, mode="scalar"):
+                through = dr.select(visible, 1, 0) + dr.mulsign(past_real, kappa)
+                turned = dr.mulsign(past_imag, kappa)
+                re, im = through * re - turned * im, through * im + turned * re
+                er, ei = through * er - turned * ei, through * ei + turned * er
             real, imag, err_real, err_imag = real + re, imag + im, err_real + er, err_imag + ei
             d2 = closest(fr, seg, line(fr, seg.X0, seg.e))
-            closer = d2 < nearest2
+            closer = visible & (d2 < nearest2)
             nearest2 = dr.select(closer, d2, nearest2)
             nearest_segment = dr.select(closer, j, nearest_segment)
             nearest_piece = dr.select(closer, i, nearest_piece)

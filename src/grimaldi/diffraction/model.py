@@ -10,6 +10,7 @@ from grimaldi.outlines.model import Outline
 from grimaldi.scene.model import Scene, Source
 
 Precision = Literal["auto", "double"]
+Occlusion = Literal["graded", "binary", "none"]
 Weights = Literal["report", "length", "kernel"]
 NYQUIST: Literal["nyquist"] = "nyquist"
 
@@ -19,7 +20,8 @@ class Options:
     """What every model is asked for.
 
     tolerance: |M_computed - M| allowed for each source and point; precision: "auto" or "double";
-    occlusion: whether bodies block the way from an outline to a point.
+    occlusion: how bodies block the way from an outline to a point: as knife edges where it grazes them, by yes or
+    no, or not at all; "graded" is `boundary`'s alone, the other models take it for "binary".
 
     Of the models that sum over sources: n is how many an edge (`huygens`; "nyquist": λ/2 apart) or a point
     (`area`) gets, None for the model's own choice; `huygens` has `weights`, and the distance epsilon [scene units]
@@ -28,7 +30,7 @@ class Options:
 
     tolerance: float = 1e-3
     precision: Precision = "auto"
-    occlusion: bool = True
+    occlusion: Occlusion = "graded"
     n: int | Literal["nyquist"] | None = None
     weights: Weights = "report"
     epsilon: float | None = None

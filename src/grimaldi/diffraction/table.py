@@ -32,6 +32,7 @@ class Piece(NamedTuple):
     reach: Any  # half its length
     lit: Any  # normals of the faces at the middle, towards the source first
     dark: Any
+    loop: Any  # the silhouette that it belongs to (`grazing`)
     closed: Any  # 1 where two faces meet, 0 at the border of a sheet
     outward: Any
     behind: Any  # how far behind it its own body comes next
@@ -65,6 +66,7 @@ class Table(NamedTuple):
             a.w,
             V(b.x, b.y, b.z),
             V(c.x, c.y, c.z),
+            c.w,
             b.w,
             V(d.x, d.y, d.z),
             d.w,
@@ -99,8 +101,13 @@ def needs_double(outline: Outline, k: float, options: Options) -> bool:
     return k * float(np.ptp(ends, axis=0).max()) > 1e6
 
 
-def table(outline: Outline, types: Types, ranges: NDArray[np.int64] | None = None) -> Table:
-    """Pack an outline; its pieces begin at the segments `ranges`, the last of which is their number (`cut`)."""
+def table(
+    outline: Outline, types: Types, ranges: NDArray[np.int64] | None = None, loop: NDArray[np.int64] | None = None
+) -> Table:
+    """Pack an outline; its pieces begin at the segments `ranges`, the last of which is their number (`cut`).
+
+    loop (n,): the silhouette that each segment belongs to, where X→P may graze others.
+    """
     ends = np.concatenate([outline.start, outline.end])
     low, high = ends.min(0), ends.max(0)
     centre = 0.5 * (low + high)
@@ -114,10 +121,10 @@ def table(outline: Outline, types: Types, ranges: NDArray[np.int64] | None = Non
     reach = 0.5 * np.add.reduceat(length[:, 0], ranges[:-1])[:, None]
     normals = outline.normals[middle]
     closed = (np.linalg.norm(normals[:, 1], axis=1) > 0).astype(float)[:, None]
-    none = np.zeros_like(reach)
+    of = np.zeros_like(reach) if loop is None else loop[middle][:, None]
     behind = np.minimum.reduceat(np.minimum(outline.behind, 1e30), ranges[:-1])[:, None]
     pieces = np.concatenate(
-        [target, reach, normals[:, 0], closed, normals[:, 1], none, outline.outward[middle], behind], 1
+        [target, reach, normals[:, 0], closed, normals[:, 1], of, outline.outward[middle], behind], 1
     )
     index = dr.uint32_array_t(types.Float)
     return Table(

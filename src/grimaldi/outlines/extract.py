@@ -35,16 +35,23 @@ def outline(scene: Scene, source: Source, *, sag: Sequence[float] | None = None)
     if scene.screen:
         return _planar(scene, source, sag or [DEFAULT_SAG * curve(shape)[1] for shape in scene.screen])
     sag = sag or [DEFAULT_SAG * curve(body.geometry)[1] for body in scene.bodies]
-    parts = [_silhouette(body, source, s) for body, s in zip(scene.bodies, sag, strict=True)]
-    if not any(len(part.start) for part in parts):
+    edges, body = edges_of(scene, source, sag)
+    if not len(body):
         return Outline.empty()
-    body = np.repeat(np.arange(len(parts)), [len(part.start) for part in parts])
-    edges = Candidates.concatenate(parts)
-    extents = np.array([np.linalg.norm(np.ptp(part.start, axis=0)) if len(part.start) else 0.0 for part in parts])
+    extents = np.zeros(len(scene.bodies))
+    for i in np.unique(body):
+        extents[i] = np.linalg.norm(np.ptp(edges.start[body == i], axis=0))
     standing = obstacles(scene.bodies, source)
     lit = lit_parts(standing, source, edges, body, LONGEST * extents[body])
     coarsest = max((s for b, s in zip(scene.bodies, sag, strict=True) if not isinstance(b.geometry, Mesh)), default=0.0)
     return assemble(edges, body, lit, gap_behind(standing, source, edges, body, lit), source, coarsest)
+
+
+def edges_of(scene: Scene, source: Source, sag: Sequence[float]) -> tuple[Candidates, Integers]:
+    """The silhouette edges of a scene's bodies, lit or not, and the body (n,) of each; sag as in `outline`."""
+    parts = [_silhouette(body, source, s) for body, s in zip(scene.bodies, sag, strict=True)]
+    body = np.repeat(np.arange(len(parts)), [len(part.start) for part in parts])
+    return Candidates.concatenate(parts or [Candidates.empty()]), body
 
 
 def curve(shape: Geometry | PlanarOutline) -> tuple[Reals, float]:

@@ -46,8 +46,10 @@ def register(V: Any) -> None:
            - "auto" or "double". (Default: "auto")
 
          * - occlusion
-           - |bool|
-           - Whether bodies block the way from an outline to a surface. (Default: true)
+           - |bool| or |string|
+           - How bodies block the way from an outline to a surface: true or "graded", by Fresnel's factor where it
+             grazes another silhouette (model "boundary"); "binary", by yes or no; false or "none", not at all.
+             (Default: true)
 
          * - n
            - |int| or |string|
@@ -109,7 +111,7 @@ def register(V: Any) -> None:
                 interference=bool(props.get("interference", True)),
                 tolerance=parameters.number(props, "tolerance", 1e-3),
                 precision=str(props.get("precision", "auto")),
-                occlusion=bool(props.get("occlusion", True)),
+                occlusion=props.get("occlusion", True),
                 n=props.get("n", None),
                 weights=str(props.get("weights", "report")),
                 epsilon=props.get("epsilon", None),
