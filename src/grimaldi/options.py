@@ -23,9 +23,10 @@ def checked_options(
     n: Any = None,
     weights: Any = "report",
     epsilon: Any = None,
+    rim: Any = "sharp",
 ) -> Options:
     """The options of every model; InputError names the one that is wrong."""
-    from grimaldi.diffraction.model import NYQUIST, Occlusion, Options, Precision, Weights
+    from grimaldi.diffraction.model import NYQUIST, Occlusion, Options, Precision, Rim, Weights
 
     try:
         tolerance = float(tolerance)
@@ -39,11 +40,13 @@ def checked_options(
         occlusion = "graded" if occlusion else "none"
     if occlusion not in get_args(Occlusion):
         raise InputError(f"occlusion: {occlusion!r} is unknown; {did_you_mean(occlusion, get_args(Occlusion))}")
+    if rim not in get_args(Rim):
+        raise InputError(f"rim: {rim!r} is unknown; {did_you_mean(rim, get_args(Rim))}")
     if weights not in get_args(Weights):
         raise InputError(f"weights: {weights!r} is unknown; {did_you_mean(weights, get_args(Weights))}")
     if n is not None and n != NYQUIST and (not isinstance(n, int) or isinstance(n, bool) or not 1 <= n <= MOST):
         raise InputError(f"n: {n!r} is no number of sources; give an integer from 1 to {MOST}, or {NYQUIST!r}")
-    return Options(tolerance, precision, occlusion, n, weights, _positive("epsilon", epsilon))
+    return Options(tolerance, precision, occlusion, rim, n, weights, _positive("epsilon", epsilon))
 
 
 def _positive(name: str, value: Any) -> float | None:
@@ -67,6 +70,7 @@ def describe(scene: Scene, *, diffraction: str, interference: bool, options: Opt
         "tolerance": options.tolerance,
         "precision": options.precision,
         "occlusion": options.occlusion,
+        "rim": options.rim,
         "n": "" if options.n is None else options.n,
         "weights": options.weights,
         "epsilon": "" if options.epsilon is None else options.epsilon,

@@ -40,6 +40,10 @@ Occlusion = Annotated[
     Literal["graded", "binary", "none"] | None,
     typer.Option(help="How bodies block the way from an outline to a point.  [default: graded]"),
 ]
+Rim = Annotated[
+    Literal["sharp", "smooth"] | None,
+    typer.Option(help="Of smooth bodies: as black screens, or with creeping waves.  [default: sharp]"),
+]
 N = Annotated[
     str | None,
     typer.Option(

@@ -92,6 +92,7 @@ def _bodies(
             HIDDEN_END * options.tolerance,
             probe if options.occlusion != "none" else None,
             None if grazing is None else near(fr, grazing, k, receivers),
+            options.rim == "smooth",
             receivers,
         )
         return _factor(tab, rule, lit_share(fr, tab, nearest, probe, receivers), 1, sums)

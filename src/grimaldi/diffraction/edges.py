@@ -141,12 +141,13 @@ def body_sum(
     share: float,
     probe: Rays | None,
     beside: Near | None,
+    smooth: bool,
     receivers: Receivers,
 ) -> tuple[Sum, Nearest]:
     """The sum over the outlines of bodies, piece by piece, each as far as it reaches the receiver.
 
     What would add less than `share` of M goes unasked; without a probe all does. Without silhouettes
-    near by a piece reaches the receiver or does not.
+    near by a piece reaches the receiver or does not. `smooth` rims are those with a radius.
     """
     F = tab.types.Float
     U = dr.uint32_array_t(F)
@@ -180,7 +181,8 @@ def body_sum(
         j = U(piece.first)
         while acts & (j < piece.end):
             seg = tab.segment(j)
-            re, im, er, ei, kappa = segment_wave(fr, seg.X0, seg.e, seg.length, k, rule, acts)
+            radius = seg.radius if dr.hint(smooth, mode="scalar") else None
+            re, im, er, ei, kappa = segment_wave(fr, seg.X0, seg.e, seg.length, k, rule, acts, radius)
             if dr.hint(beside is not None, mode="scalar"):
                 through = dr.select(visible, 1, 0) + dr.mulsign(past_real, kappa)
                 turned = dr.mulsign(past_imag, kappa)

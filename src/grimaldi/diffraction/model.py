@@ -11,6 +11,7 @@ from grimaldi.scene.model import Scene, Source
 
 Precision = Literal["auto", "double"]
 Occlusion = Literal["graded", "binary", "none"]
+Rim = Literal["sharp", "smooth"]
 Weights = Literal["report", "length", "kernel"]
 NYQUIST: Literal["nyquist"] = "nyquist"
 
@@ -21,7 +22,8 @@ class Options:
 
     tolerance: |M_computed - M| allowed for each source and point; precision: "auto" or "double";
     occlusion: how bodies block the way from an outline to a point: as knife edges where it grazes them, by yes or
-    no, or not at all; "graded" is `boundary`'s alone, the other models take it for "binary".
+    no, or not at all; "graded" is `boundary`'s alone, the other models take it for "binary";
+    rim: "sharp", black screens, or "smooth", waves that creep round smooth bodies (`boundary` alone).
 
     Of the models that sum over sources: n is how many an edge (`huygens`; "nyquist": λ/2 apart) or a point
     (`area`) gets, None for the model's own choice; `huygens` has `weights`, and the distance epsilon [scene units]
@@ -31,6 +33,7 @@ class Options:
     tolerance: float = 1e-3
     precision: Precision = "auto"
     occlusion: Occlusion = "graded"
+    rim: Rim = "sharp"
     n: int | Literal["nyquist"] | None = None
     weights: Weights = "report"
     epsilon: float | None = None

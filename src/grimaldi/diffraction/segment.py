@@ -18,6 +18,7 @@ from typing import Any, NamedTuple
 import drjit as dr
 import numpy as np
 
+from grimaldi.diffraction.creeping import Creeping, creeping
 from grimaldi.diffraction.frame import Frame
 
 
@@ -90,7 +91,7 @@ def detour(frame: Frame, ln: Line, t: Any, d2: Any) -> tuple[Any, Any, Any, Any]
     return delta, 0.5 + 0.5 * (z1 * z2 - d2) * inv_r * inv_s, inv_r, inv_s
 
 
-def end_wave(frame: Frame, ln: Line, t: Any, k: float) -> tuple[Any, Any, Any, Any, Any]:
+def end_wave(frame: Frame, ln: Line, t: Any, k: float, creep: Creeping | None = None) -> tuple[Any, Any, Any, Any, Any]:
     """B(t) (real, imaginary), the series' next term (real, imaginary) and kΔ'."""
     u = t - ln.td
     b = ln.eqq * u  # q·eq
@@ -112,6 +113,11 @@ def end_wave(frame: Frame, ln: Line, t: Any, k: float) -> tuple[Any, Any, Any, A
     rho = (0.5 * dcos / dr.maximum(C, 1e-12) - 2 * b / d2 - dd / slope) / (slope * k)
     pole = 1 / (k * delta)
     rho2 = rho * rho + 2 * dr.square(rho + pole) + pole * pole
+    if creep is not None:  # f W: ρ grows by δ = (ln W)'/kΔ', ρ₂ by 2ρδ + δ² + δ'/kΔ', but for (ln W)''
+        g *= creep.damping(C, inv_s)
+        more = creep.slope(C, inv_s, ds, dcos) / (slope * k)
+        rho2 += more * (2 * rho + more - dd / (slope * slope * k))
+        rho += more
     sin, cos_ = sincos(k * delta)
     real, imag = g * rho, g * (rho2 - 1)
     last = 5 * g * rho * rho2  # |g₃/g₀| is 4 to 5 ρ ρ₂ between the two limits
@@ -129,6 +135,7 @@ class Stationary(NamedTuple):
 
     t: Any
     radius: Any
+    from_source: Any  # the line's distance from S; 0 for a plane wave
 
     def reach(self, y: Any) -> Any:
         """How far from t_s Δ has grown by y at the latest."""
@@ -149,7 +156,7 @@ def stationary(frame: Frame, ln: Line, eq_q0: tuple[Any, Any]) -> Stationary:
     t2 = z2 * ln.ea - b0
     if frame.plane:
         sin = dr.sqrt(ln.eqq)
-        return Stationary(t2 - ln.ea * rho2 / sin, rho2 / (sin * ln.eqq))
+        return Stationary(t2 - ln.ea * rho2 / sin, rho2 / (sin * ln.eqq), 0 * rho2)
     z1 = frame.z1 + ln.h
     rho1 = dr.sqrt(dr.squared_norm(z1 * eq - ln.ea * q0) + k2)
     t1 = -(z1 * ln.ea + b0)
@@ -158,7 +165,7 @@ def stationary(frame: Frame, ln: Line, eq_q0: tuple[Any, Any]) -> Stationary:
     sin2 = dr.square(total / path)
     share = rho2 / total
     # r and s there are path·ρ1/total and path·ρ2/total
-    return Stationary(t2 + (t1 - t2) * share, path * share * (1 - share) / sin2)
+    return Stationary(t2 + (t1 - t2) * share, path * share * (1 - share) / sin2, rho1)
 
 
 def sincos(x: Any) -> tuple[Any, Any]:
@@ -173,7 +180,9 @@ def _asinh(x: Any) -> Any:
 
 
 @dr.syntax
-def _direct(frame: Frame, ln: Line, st: Stationary, lo: Any, hi: Any, k: float, rule: Rule) -> Any:
+def _direct(
+    frame: Frame, ln: Line, st: Stationary, lo: Any, hi: Any, k: float, rule: Rule, creep: Creeping | None
+) -> Any:
     """∫ C e^{ikΔ} dφ over lo..hi by panels, marched so that each spans little phase and little v."""
     Float = type(lo)
     Bool = dr.mask_t(Float)
@@ -193,9 +202,12 @@ def _direct(frame: Frame, ln: Line, st: Stationary, lo: Any, hi: Any, k: float, 
             ev = dr.exp(dr.fma(dv, x_j, v0))
             inv = dr.rcp(ev)
             cosh = 0.5 * (ev + inv)
-            delta, C, _, _ = detour(frame, ln, ln.td + 0.5 * ln.w * (ev - inv), ln.eqq * dr.square(ln.w * cosh))
+            delta, C, _, inv_s = detour(frame, ln, ln.td + 0.5 * ln.w * (ev - inv), ln.eqq * dr.square(ln.w * cosh))
             sin, cos = sincos(k * delta)
             amplitude = w_j * dv * C / cosh
+            if dr.hint(creep is not None, mode="scalar"):
+                assert creep is not None
+                amplitude *= creep.damping(C, inv_s)
             real = dr.fma(amplitude, cos, real)
             imag = dr.fma(amplitude, sin, imag)
         t = end
@@ -205,16 +217,19 @@ def _direct(frame: Frame, ln: Line, st: Stationary, lo: Any, hi: Any, k: float, 
 
 @dr.syntax
 def segment_wave(
-    frame: Frame, X0: Any, e: Any, length: Any, k: float, rule: Rule, active: Any
+    frame: Frame, X0: Any, e: Any, length: Any, k: float, rule: Rule, active: Any, radius: Any = None
 ) -> tuple[Any, Any, Any, Any, Any]:
-    """∫ C e^{ikΔ} dφ over X0 + t e, 0 <= t <= length.
+    """∫ C e^{ikΔ} dφ over X0 + t e, 0 <= t <= length; damped as at a smooth rim where its radius ρ is given.
 
-    X0 (3), e (3) unit, length: arrays of one precision, X0 relative to the outlines' centre; k: wavenumber.
+    X0 (3), e (3) unit, length, radius: arrays of one precision, X0 relative to the outlines' centre; k: wavenumber.
     Returns its real and imaginary part, the same of the error estimate, and κ = a·(q0×e).
     """
     Float = type(length)
     ln = line(frame, X0, e)
     st = stationary(frame, ln, (e - ln.ea * frame.a, ln.q0))
+    creep = None
+    if dr.hint(radius is not None, mode="scalar"):
+        creep = creeping(frame, ln.kappa, ln.eqq, st.from_source, radius, k)
     half = st.reach(Float(rule.K / k))
     # between the stationary point and the foot neither series nor its poles are far: keep both inside
     lo = dr.clip(dr.minimum(st.t, ln.td) - half, 0, length)
@@ -223,21 +238,21 @@ def segment_wave(
     left, right = lo > 0, hi < length
     t0 = dr.select(left, Float(0), hi)
     t1 = dr.select(right, length, lo)
-    r0, i0, er0, ei0, _ = end_wave(frame, ln, t0, k)
-    r1, i1, er1, ei1, _ = end_wave(frame, ln, t1, k)
+    r0, i0, er0, ei0, _ = end_wave(frame, ln, t0, k, creep)
+    r1, i1, er1, ei1, _ = end_wave(frame, ln, t1, k, creep)
     series = left | right
     real = dr.select(series, r1 - r0, 0)
     imag = dr.select(series, i1 - i0, 0)
     err_r = dr.select(series, er1 - er0, 0)
     err_i = dr.select(series, ei1 - ei0, 0)
     if active & (hi > lo):
-        dre, dim = _direct(frame, ln, st, lo, hi, k, rule)
+        dre, dim = _direct(frame, ln, st, lo, hi, k, rule, creep)
         real = real + dre
         imag = imag + dim
         # a segment that sticks out on both sides: take the series' jump over the middle back out
         if left & right:
-            rl, il, erl, eil, _ = end_wave(frame, ln, lo, k)
-            rh, ih, erh, eih, _ = end_wave(frame, ln, hi, k)
+            rl, il, erl, eil, _ = end_wave(frame, ln, lo, k, creep)
+            rh, ih, erh, eih, _ = end_wave(frame, ln, hi, k, creep)
             real = real - (rh - rl)
             imag = imag - (ih - il)
             err_r = err_r - (erh - erl)

@@ -21,6 +21,7 @@ class Segment(NamedTuple):
     X1: Any
     e: Any
     length: Any
+    radius: Any  # of curvature of the surface along the ray, 0 where the rim is sharp
 
 
 class Piece(NamedTuple):
@@ -53,7 +54,7 @@ class Table(NamedTuple):
     def segment(self, i: Any) -> Segment:
         P, V = self.types.Packet, self.types.Vector
         a, b, c = (dr.gather(P, self.segments, 3 * i + j) for j in range(3))
-        return Segment(V(a.x, a.y, a.z), V(b.x, b.y, b.z), V(c.x, c.y, c.z), a.w)
+        return Segment(V(a.x, a.y, a.z), V(b.x, b.y, b.z), V(c.x, c.y, c.z), a.w, c.w)
 
     def piece(self, i: Any) -> Piece:
         P, V = self.types.Packet, self.types.Vector
@@ -115,7 +116,7 @@ def table(
     X0, X1 = outline.start - centre, outline.end - centre
     length = np.linalg.norm(X1 - X0, axis=1, keepdims=True)
     zero = np.zeros_like(length)
-    segments = np.concatenate([X0, length, X1, zero, (X1 - X0) / length, zero], 1)
+    segments = np.concatenate([X0, length, X1, zero, (X1 - X0) / length, outline.radius[:, None]], 1)
     middle = (ranges[:-1] + ranges[1:]) // 2
     target = 0.5 * (X0[middle] + X1[middle])
     reach = 0.5 * np.add.reduceat(length[:, 0], ranges[:-1])[:, None]

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from grimaldi.outlines import cylinder, disk, mesh, planar, sphere
+from grimaldi.outlines import curvature, cylinder, disk, mesh, planar, sphere
 from grimaldi.outlines.candidate import Candidates, toward
 from grimaldi.outlines.hidden import Obstacle, Queries, behind, obstacles
 from grimaldi.outlines.lit import Stretches, lit_parts
@@ -44,7 +44,15 @@ def outline(scene: Scene, source: Source, *, sag: Sequence[float] | None = None)
     standing = obstacles(scene.bodies, source)
     lit = lit_parts(standing, source, edges, body, LONGEST * extents[body])
     coarsest = max((s for b, s in zip(scene.bodies, sag, strict=True) if not isinstance(b.geometry, Mesh)), default=0.0)
-    return assemble(edges, body, lit, gap_behind(standing, source, edges, body, lit), source, coarsest)
+    return assemble(
+        edges,
+        body,
+        lit,
+        gap_behind(standing, source, edges, body, lit),
+        source,
+        coarsest,
+        curvature.radii(scene.bodies, source, edges, body),
+    )
 
 
 def edges_of(scene: Scene, source: Source, sag: Sequence[float]) -> tuple[Candidates, Integers]:
@@ -100,8 +108,16 @@ def _planar(scene: Scene, source: Source, sag: Sequence[float]) -> Outline:
     return assemble(edges, np.concatenate(number), Stretches.whole(n), np.full(n, np.inf), source, max(sag))
 
 
-def assemble(edges: Candidates, body: Integers, lit: Stretches, behind: Reals, source: Source, sag: float) -> Outline:
-    """The lit stretches in the order of their chains."""
+def assemble(
+    edges: Candidates,
+    body: Integers,
+    lit: Stretches,
+    behind: Reals,
+    source: Source,
+    sag: float,
+    radius: Reals | None = None,
+) -> Outline:
+    """The lit stretches in the order of their chains; radius as in `Outline`, for each edge."""
     c = lit.candidate
     span = edges.end[c] - edges.start[c]
     start = np.where((lit.low > 0)[:, None], edges.start[c] + lit.low[:, None] * span, edges.start[c])
@@ -117,7 +133,10 @@ def assemble(edges: Candidates, body: Integers, lit: Stretches, behind: Reals, s
     size = np.linalg.norm(out, axis=1, keepdims=True)
     hole = (body[c] < 0)[:, None]  # a hole's open side is the one its loop encloses
     outward = np.where(hole, -out, out) / np.maximum(size, 1e-300)
-    return Outline(start, end, body[c], edges.edge[c], interval, edges.normals[c], outward, behind[order], chain, sag)
+    radius = np.zeros(len(c)) if radius is None else radius[c]
+    return Outline(
+        start, end, body[c], edges.edge[c], interval, edges.normals[c], outward, behind[order], chain, radius, sag
+    )
 
 
 def _chains(start: Reals, end: Reals) -> tuple[Integers, Integers]:

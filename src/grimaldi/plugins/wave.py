@@ -51,6 +51,11 @@ def register(V: Any) -> None:
              grazes another silhouette (model "boundary"); "binary", by yes or no; false or "none", not at all.
              (Default: true)
 
+         * - rim
+           - |string|
+           - How the model "boundary" takes the rims of smooth bodies: "sharp", as black screens, or "smooth", with
+             waves into the shadow damped like creeping waves. (Default: "sharp")
+
          * - n
            - |int| or |string|
            - Of the models "huygens" and "area": sources an edge ("nyquist": half a wavelength apart), or samples a
@@ -112,6 +117,7 @@ def register(V: Any) -> None:
                 tolerance=parameters.number(props, "tolerance", 1e-3),
                 precision=str(props.get("precision", "auto")),
                 occlusion=props.get("occlusion", True),
+                rim=props.get("rim", "sharp"),
                 n=props.get("n", None),
                 weights=str(props.get("weights", "report")),
                 epsilon=props.get("epsilon", None),
