@@ -78,16 +78,21 @@ def spiral(n):
     return np.stack([rho * np.cos(turn), rho * np.sin(turn), z], axis=1)
 
 
-def test_a_finely_meshed_ball_is_a_ball(tmp_path: Path):
-    corners = KA * spiral(20_000)
-    meshed = mesh(tmp_path / "ball.obj", corners, ConvexHull(corners).simplices)
-    light, x = oracle.Plane(DIRECTION), np.array([1, 0, -0.1])
-    x /= np.linalg.norm(x)
-    points = KA * (ACROSS[:, None] * x + 2 * DIRECTION)
-    smooth, of_mesh = (
-        factor(light, points, ball, wavelength=LONG, rim="smooth") for ball in (shape("sphere", affine(KA)), meshed)
-    )
-    np.testing.assert_allclose(of_mesh, smooth, rtol=0, atol=0.01)
+# An icosphere has faces exactly along the z axis.
+@pytest.mark.parametrize(("kind", "direction"), [("hull", DIRECTION), ("icosphere", np.array([0, 0, 1.0]))])
+def test_a_finely_meshed_ball_is_a_ball(kind, direction, tmp_path: Path):
+    x = np.cross(direction, [0.3, 0.9, 0.1])
+    points = KA * (ACROSS[:, None] * x / np.linalg.norm(x) + 2 * direction)
+    if kind == "hull":
+        corners = KA * spiral(20_000)
+        faces = ConvexHull(corners).simplices
+    else:
+        ball = trimesh.creation.icosphere(subdivisions=6, radius=KA)
+        corners, faces = ball.vertices, ball.faces
+    balls = shape("sphere", affine(KA)), mesh(tmp_path / "ball.obj", corners, faces)
+    for rim, allowed in (("smooth", 0.01), ("sharp", 0.1)):
+        exact, meshed = (factor(oracle.Plane(direction), points, ball, wavelength=LONG, rim=rim) for ball in balls)
+        np.testing.assert_allclose(meshed, exact, rtol=0, atol=allowed)
 
 
 @pytest.mark.parametrize("kind", ["disk", "rectangle", "cube"])

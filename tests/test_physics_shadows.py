@@ -96,10 +96,11 @@ def test_a_sphere_off_axis_is_its_tangent_circle(light):
     np.testing.assert_allclose(computed, expected, rtol=0, atol=1e-4)
 
 
-def test_a_cube_is_its_front_face():
-    # From z = -40 only the face at z = -8 is lit; its border is the outline.
-    expected = 1 - oracle.area_factor(LAMP, BEHIND, oracle.polygon_area(square(8, z=-8)), 1)
-    computed = factor(LAMP, BEHIND, shape("cube", affine(8)), tolerance=1e-5)
+@pytest.mark.parametrize("light", [LAMP, PLANE], ids=["point", "plane"])
+def test_a_cube_is_its_front_face(light):
+    # From z = -40 only the face at z = -8 is lit; its border is the outline. Along z four faces are edge-on.
+    expected = 1 - oracle.area_factor(light, BEHIND, oracle.polygon_area(square(8, z=-8)), 1)
+    computed = factor(light, BEHIND, shape("cube", affine(8)), tolerance=1e-5)
     np.testing.assert_allclose(computed, expected, rtol=0, atol=1e-4)
 
 
