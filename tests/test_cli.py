@@ -82,6 +82,8 @@ def said(done: subprocess.CompletedProcess[str]) -> str:
         (["outline", "arago", "-o", "x.svg", "--variant", "scalar_rgb"], "variant scalar_rgb: waves need"),
         (["field", "arago", "-o", "x.npz", "--plane", PLANE, "--wavelength", "1e-320"], "wavelength: '1e-320'"),
         (["field", "far.xml", "-o", "x.npz", "--plane", PLANE, "--wavelength", "1"], "far.xml: lamp: position is too"),
+        (["field", "arago", "-o", "x.npz", "--plane", PLANE, "--occlusion", "some"], "graded"),
+        (["field", "arago", "-o", "x.npz", "--plane", PLANE, "--rim", "round"], "smooth"),
         (["field", "young", "-o", "x.npz"], "--points"),
         (["field", "young", "-o", "x.npz", "--points", "p.npy", "--plane", PLANE], "--points"),
         (["field", "young", "-o", "x.npz", "--points", "missing.npy"], "missing.npy: cannot be read"),

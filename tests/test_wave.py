@@ -196,6 +196,8 @@ def test_scene_that_changes_is_prepared_anew():
         ({"wavelength": -1.0}, "wavelength"),
         ({"diffraction": "boundry"}, "boundry"),
         ({"tolerance": 0.0}, "tolerance"),
+        ({"occlusion": "some"}, "occlusion"),
+        ({"rim": "round"}, "rim"),
         ({"spp": 0}, "spp"),
         ({"size": (0, 4)}, "size"),
         ({"seed": -1}, "seed"),
@@ -207,6 +209,15 @@ def test_wrong_options_are_named(wrong, says):
     with pytest.raises(InputError, match=says) as caught:
         grimaldi.render(young(), **wrong)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(("given", "means"), [(True, "graded"), (False, "none"), ("binary", "binary")])
+def test_the_integrator_takes_what_render_takes(given, means):
+    wave = mi.load_dict({"type": "wave", "wavelength": 1.0, "occlusion": given, "rim": "smooth"})
+    options = wave.light_of.settings.options()
+    assert (options.occlusion, options.rim) == (means, "smooth")
+    with pytest.raises(RuntimeError, match="rim: 'round' is unknown"):
+        mi.load_dict({"type": "wave", "wavelength": 1.0, "rim": "round"})
 
 
 def test_without_a_wavelength_one_is_suggested():

@@ -349,6 +349,8 @@ def test_what_is_no_scene(scene, says):
     [
         ({"diffraction": "boundry"}, "diffraction: 'boundry' is no model; did you mean 'boundary'?"),
         ({"diffraction": "rainbow"}, "diffraction: 'rainbow' is no model; known are area, boundary, huygens, none"),
+        ({"occlusion": "binray"}, "occlusion: 'binray' is unknown; did you mean 'binary'?"),
+        ({"rim": "smoth"}, "rim: 'smoth' is unknown; did you mean 'smooth'?"),
         ({"precision": "duoble"}, "precision: 'duoble' is unknown; did you mean 'double'?"),
         ({"tolerence": 1e-3}, "tolerence: no such option; did you mean 'tolerance'?"),
         ({"weights": "lenght"}, "weights: 'lenght' is unknown; did you mean 'length'?"),

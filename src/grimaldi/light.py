@@ -35,7 +35,8 @@ class Settings:
     interference: bool = True
     tolerance: float = 1e-3
     precision: str = "auto"
-    occlusion: bool = True
+    occlusion: bool | str = True
+    rim: str = "sharp"
     n: int | str | None = None
     weights: str = "report"
     epsilon: float | None = None
@@ -48,7 +49,9 @@ class Settings:
 
     def options(self) -> Options:
         """The options of the model."""
-        return checked_options(self.tolerance, self.precision, self.occlusion, self.n, self.weights, self.epsilon)
+        return checked_options(
+            self.tolerance, self.precision, self.occlusion, self.n, self.weights, self.epsilon, self.rim
+        )
 
 
 class Beam(NamedTuple):

@@ -23,10 +23,11 @@ def checked_options(
     n: Any = None,
     weights: Any = "report",
     epsilon: Any = None,
+    rim: Any = "sharp",
     fast: Any = True,
 ) -> Options:
     """The options of every model; InputError names the one that is wrong."""
-    from grimaldi.diffraction.model import NYQUIST, Options, Precision, Weights
+    from grimaldi.diffraction.model import NYQUIST, Occlusion, Options, Precision, Rim, Weights
 
     try:
         tolerance = float(tolerance)
@@ -36,13 +37,19 @@ def checked_options(
         raise InputError(f"tolerance: {tolerance:g} is out of reach; give a number from 1e-12 to 1")
     if precision not in get_args(Precision):
         raise InputError(f"precision: {precision!r} is unknown; {did_you_mean(precision, get_args(Precision))}")
+    if isinstance(occlusion, bool):
+        occlusion = "graded" if occlusion else "none"
+    if occlusion not in get_args(Occlusion):
+        raise InputError(f"occlusion: {occlusion!r} is unknown; {did_you_mean(occlusion, get_args(Occlusion))}")
+    if rim not in get_args(Rim):
+        raise InputError(f"rim: {rim!r} is unknown; {did_you_mean(rim, get_args(Rim))}")
     if weights not in get_args(Weights):
         raise InputError(f"weights: {weights!r} is unknown; {did_you_mean(weights, get_args(Weights))}")
     if n is not None and n != NYQUIST and (not isinstance(n, int) or isinstance(n, bool) or not 1 <= n <= MOST):
         raise InputError(f"n: {n!r} is no number of sources; give an integer from 1 to {MOST}, or {NYQUIST!r}")
     if not isinstance(fast, bool):
         raise InputError(f"fast: {fast!r} is neither True nor False; give one of these")
-    return Options(tolerance, precision, bool(occlusion), n, weights, _positive("epsilon", epsilon), fast)
+    return Options(tolerance, precision, occlusion, rim, n, weights, _positive("epsilon", epsilon), fast)
 
 
 def _positive(name: str, value: Any) -> float | None:
@@ -65,7 +72,8 @@ def describe(scene: Scene, *, diffraction: str, interference: bool, options: Opt
         "interference": str(bool(interference)).lower(),
         "tolerance": options.tolerance,
         "precision": options.precision,
-        "occlusion": str(options.occlusion).lower(),
+        "occlusion": options.occlusion,
+        "rim": options.rim,
         "n": "" if options.n is None else options.n,
         "weights": options.weights,
         "epsilon": "" if options.epsilon is None else options.epsilon,

@@ -25,7 +25,8 @@ def field(
     interference: bool = True,
     tolerance: float = 1e-3,
     precision: Literal["auto", "double"] = "auto",
-    occlusion: bool = True,
+    occlusion: bool | Literal["graded", "binary", "none"] = True,
+    rim: Literal["sharp", "smooth"] = "sharp",
     n: int | Literal["nyquist"] | None = None,
     weights: Literal["report", "length", "kernel"] = "report",
     epsilon: float | None = None,
@@ -46,7 +47,10 @@ def field(
         tolerance: |M_computed - M| allowed for each source and point, where U = U0 M: the error of integrating the
             stated model, not of the model.
         precision: "auto" (Float32 sums where the tolerance allows), or "double".
-        occlusion: whether bodies block the way from an outline to a point.
+        occlusion: how bodies block the way from an outline to a point. True or "graded": of "boundary", by Fresnel's
+            factor where it grazes another silhouette; "binary": by yes or no; False or "none": not at all.
+        rim: how "boundary" takes the rims of smooth bodies: "sharp", as those of black screens, or "smooth", with waves
+            into the shadow damped like creeping waves (spheres, cylinders, meshes that bend by less than 30° an edge).
         n: sources an edge of "huygens" (3 unless given; "nyquist": at most λ/2 apart); random samples a point of
             "area", which unless given integrates by quadrature.
         weights: of the sources of "huygens": "report" (equal strength), "length" or "kernel" (which converges to
@@ -80,7 +84,7 @@ def field(
 
     check_options(unknown, signature(field).parameters)
     p = checked_points(points)
-    options = checked_options(tolerance, precision, occlusion, n, weights, epsilon, fast)
+    options = checked_options(tolerance, precision, occlusion, n, weights, epsilon, rim, fast)
     factor = model(diffraction)
     loaded = load(scene, scene_unit=scene_unit)
     wavelengths = parse_wavelengths(loaded.wavelength if wavelength is None else wavelength, loaded.unit)

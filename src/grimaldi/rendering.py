@@ -35,7 +35,8 @@ def render(
     interference: bool | None = None,
     tolerance: float | None = None,
     precision: Literal["auto", "double"] | None = None,
-    occlusion: bool | None = None,
+    occlusion: bool | Literal["graded", "binary", "none"] | None = None,
+    rim: Literal["sharp", "smooth"] | None = None,
     n: int | Literal["nyquist"] | None = None,
     weights: Literal["report", "length", "kernel"] | None = None,
     epsilon: float | None = None,
@@ -50,8 +51,8 @@ def render(
 
     Args:
         scene: path, dict, `mi.Scene`, name of a built-in scene, or what `grimaldi.load` returned.
-        wavelength, scene_unit, diffraction, interference, tolerance, precision, occlusion, n, weights, epsilon: as in
-            `grimaldi.field`.
+        wavelength, scene_unit, diffraction, interference, tolerance, precision, occlusion, rim, n, weights, epsilon: as
+            in `grimaldi.field`.
         spp: samples a pixel.
         seed: of the random numbers.
         size: (width, height) in pixels.
@@ -90,6 +91,7 @@ def render(
         "tolerance": tolerance,
         "precision": precision,
         "occlusion": occlusion,
+        "rim": rim,
         "n": n,
         "weights": weights,
         "epsilon": epsilon,

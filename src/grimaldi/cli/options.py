@@ -36,6 +36,14 @@ Interference = Annotated[
 ]
 Tolerance = Annotated[float | None, typer.Option(help="Largest error of M for each source and point.  [default: 1e-3]")]
 Precision = Annotated[Literal["auto", "double"] | None, typer.Option(help="Of the edge integrals.")]
+Occlusion = Annotated[
+    Literal["graded", "binary", "none"] | None,
+    typer.Option(help="How bodies block the way from an outline to a point.  [default: graded]"),
+]
+Rim = Annotated[
+    Literal["sharp", "smooth"] | None,
+    typer.Option(help="Of smooth bodies: as black screens, or with creeping waves.  [default: sharp]"),
+]
 N = Annotated[
     str | None,
     typer.Option(

@@ -15,12 +15,14 @@ from grimaldi.diffraction import none
 from grimaldi.diffraction.arrays import Types, types
 from grimaldi.diffraction.edges import Margins, Sum, body_sum, lit_share, planar_sum
 from grimaldi.diffraction.frame import Frame, frame
+from grimaldi.diffraction.grazing import chords, near
 from grimaldi.diffraction.model import Evaluate, Factor, Options, Receivers
 from grimaldi.diffraction.occlusion import rays
 from grimaldi.diffraction.screen import beyond
 from grimaldi.diffraction.segment import Rule
 from grimaldi.diffraction.table import CURVE, Table, needs_double, table
 from grimaldi.outlines.model import Outline
+from grimaldi.outlines.silhouettes import loops, same_loop, silhouettes
 from grimaldi.scene.model import Scene, Source
 
 HIDDEN_END = 0.02  # of the tolerance: what an untested X→P may at most leave behind
@@ -117,10 +119,15 @@ def _planar(problem: Problem, precision: Types) -> Evaluate:
 
 
 def _bodies(problem: Problem, precision: Types) -> Evaluate:
-    source, options = problem.source, problem.options
-    tab = table(problem.outline, source, precision)
-    rule, k = problem.rule(), problem.k
-    probe = rays(problem.scene, source, problem.outline.sag)
+    scene, source, outline, k, options = problem
+    rule = problem.rule()
+    probe = rays(scene, source, outline.sag)
+    tab, grazing = table(outline, source, precision), None
+    if options.occlusion == "graded":
+        whole = silhouettes(scene, source)
+        loop = loops(whole)
+        tab = table(outline, source, precision, loop=same_loop(outline, whole, loop))
+        grazing = chords(whole, loop, tab.centre, precision)
 
     def evaluate(receivers: Receivers) -> Factor:
         fr = frame(source, receivers.p, tab)
@@ -130,7 +137,9 @@ def _bodies(problem: Problem, precision: Types) -> Evaluate:
             tab.device(k),
             rule,
             HIDDEN_END * options.tolerance,
-            probe if options.occlusion else None,
+            probe if options.occlusion != "none" else None,
+            None if grazing is None else near(fr, grazing, tab.device(k), receivers),
+            options.rim == "smooth",
             receivers,
         )
         lit = lit_share(fr, tab, nearest, probe, receivers)

@@ -12,7 +12,9 @@ import mitsuba as mi
 import numpy as np
 
 from grimaldi.diffraction.arrays import on_device
+from grimaldi.diffraction.creeping import damped
 from grimaldi.diffraction.frame import Frame, constant
+from grimaldi.diffraction.grazing import FAINT, Near, grazed, other_than
 from grimaldi.diffraction.model import Receivers
 from grimaldi.diffraction.occlusion import Rays
 from grimaldi.diffraction.segment import Line, Rule, growth, line, path, segment_wave
@@ -128,15 +130,15 @@ def sounds(fr: Frame, piece: Piece, n: Any) -> Any:
     return above & behind
 
 
-def _matters(fr: Frame, piece: Piece, e: Any, k: Any, share: float) -> Any:
-    """Whether the chain's wave, cut off somewhere on this piece, would exceed `share` of M.
+def _cut_off(fr: Frame, piece: Piece, e: Any, k: Any) -> Any:
+    """|M| that the chain's wave, cut off somewhere on this piece, would at most leave.
 
     The end of a chain sends |M| = √D / (4π (D + w) √w), D = kΔs at the stationary point, w = k(Δ - Δs).
     """
     st = path(fr, line(fr, piece.middle, e), k)
     D = dr.maximum(st.A, 0.01)
     w = dr.maximum(growth(fr, st, dr.copysign(dr.maximum(dr.abs(st.t) - piece.reach, 0), -st.t), k), 0.1)
-    return dr.sqrt(D) > 4 * np.pi * share * (D + w) * dr.sqrt(w)
+    return dr.sqrt(D) / (4 * np.pi * (D + w) * dr.sqrt(w))
 
 
 def closest(fr: Frame, seg: Segment, ln: Line) -> Any:
@@ -151,9 +153,21 @@ def closest(fr: Frame, seg: Segment, ln: Line) -> Any:
 
 @dr.syntax
 def body_sum(
-    fr: Frame, tab: Table, k: Any, rule: Rule, share: float, probe: Rays | None, receivers: Receivers
+    fr: Frame,
+    tab: Table,
+    k: Any,
+    rule: Rule,
+    share: float,
+    probe: Rays | None,
+    beside: Near | None,
+    smooth: bool,
+    receivers: Receivers,
 ) -> tuple[Sum, Nearest, Margins]:
-    """The sum over the outlines of bodies, piece by piece, each only where it reaches the receiver."""
+    """The sum over the outlines of bodies, piece by piece, each as far as it reaches the receiver.
+
+    What would add less than `share` of M goes unasked; without a probe all does. Without silhouettes
+    near by a piece reaches the receiver or does not. `smooth` rims are those with a radius.
+    """
     F = tab.types.Float
     U = dr.uint32_array_t(F)
     n = tab.types.Vector(receivers.n)
@@ -168,22 +182,38 @@ def body_sum(
     while receivers.active & (i < tab.n_pieces):
         piece = tab.piece(i)
         acts = sounds(fr, piece, n)
+        visible = dr.mask_t(F)(acts)
+        past_real, past_imag = F(0), F(0)
         if dr.hint(probe is not None, mode="scalar"):
             assert probe is not None
-            tested = acts & _matters(fr, piece, tab.segment(piece.first).e, k, share)
+            left = _cut_off(fr, piece, tab.segment(piece.first).e, k)
+            tested = acts & (left > share)
             if tested:
                 x = mi.Point3f(piece.middle + constant(tab.types.Vector, tab.centre))
-                acts = acts & probe.reaches(x, piece, p, tested)
+                visible = acts & probe.reaches(x, piece, p, tested)
+            if dr.hint(beside is not None, mode="scalar"):
+                assert beside is not None
+                loop, close = other_than(beside, piece)
+                close &= tested & (left > FAINT)
+                if close:
+                    past_real, past_imag = grazed(fr, beside.silhouettes, piece, loop, visible, k, close)
+            acts = visible | (past_real != 0) | (past_imag != 0)
         j = U(piece.first)
         while acts & (j < piece.end):
             seg = tab.segment(j)
             ln = line(fr, seg.X0, seg.e)
             wave = segment_wave(fr, ln, seg.length, k, rule, acts)
+            if dr.hint(smooth, mode="scalar"):
+                wave = damped(wave, fr, ln, seg.length, seg.radius, k)
+            if dr.hint(beside is not None, mode="scalar"):
+                wave = wave.times(
+                    dr.select(visible, 1, 0) + dr.mulsign(past_real, ln.kappa), dr.mulsign(past_imag, ln.kappa)
+                )
             real, imag = real + wave.real, imag + wave.imag
             err_real, err_imag = err_real + wave.err_real, err_imag + wave.err_imag
             receiver2 = dr.minimum(receiver2, to_receiver(fr, seg, ln))
             d2 = closest(fr, seg, ln)
-            closer = d2 < nearest2
+            closer = visible & (d2 < nearest2)
             nearest2 = dr.select(closer, d2, nearest2)
             nearest_segment = dr.select(closer, j, nearest_segment)
             nearest_piece = dr.select(closer, i, nearest_piece)

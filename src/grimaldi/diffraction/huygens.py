@@ -87,7 +87,7 @@ def huygens(scene: Scene, source: Source, outline: Outline, k: float, options: O
     floor = rounding + CURVE * k * outline.detour
     if scene.screen:
         return _planar(scene, source, lamps, k, floor, geometric)
-    return _bodies(scene, source, lamps, sources.sag, k, floor, options.occlusion, geometric)
+    return _bodies(scene, source, lamps, sources.sag, k, floor, options.occlusion != "none", geometric)
 
 
 def _parts(outline: Outline, k: float, options: Options) -> np.ndarray:

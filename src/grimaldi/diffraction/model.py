@@ -10,6 +10,8 @@ from grimaldi.outlines.model import Outline
 from grimaldi.scene.model import Scene, Source
 
 Precision = Literal["auto", "double"]
+Occlusion = Literal["graded", "binary", "none"]
+Rim = Literal["sharp", "smooth"]
 Weights = Literal["report", "length", "kernel"]
 NYQUIST: Literal["nyquist"] = "nyquist"
 
@@ -19,8 +21,10 @@ class Options:
     """What every model is asked for.
 
     tolerance: |M_computed - M| allowed for each source and point; precision: "auto" or "double";
-    occlusion: whether bodies block the way from an outline to a point; fast: whether `field` may take one transform
-    for all points of a plane behind holes or masks.
+    occlusion: how bodies block the way from an outline to a point: as knife edges where it grazes them, by yes or
+    no, or not at all; "graded" is `boundary`'s alone, the other models take it for "binary";
+    rim: "sharp", black screens, or "smooth", waves that creep round smooth bodies (`boundary` alone);
+    fast: whether `field` may take one transform for all points of a plane behind holes or masks.
 
     Of the models that sum over sources: n is how many an edge (`huygens`; "nyquist": λ/2 apart) or a point
     (`area`) gets, None for the model's own choice; `huygens` has `weights`, and the distance epsilon [scene units]
@@ -29,7 +33,8 @@ class Options:
 
     tolerance: float = 1e-3
     precision: Precision = "auto"
-    occlusion: bool = True
+    occlusion: Occlusion = "graded"
+    rim: Rim = "sharp"
     n: int | Literal["nyquist"] | None = None
     weights: Weights = "report"
     epsilon: float | None = None

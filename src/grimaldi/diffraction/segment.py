@@ -294,6 +294,15 @@ class Wave(NamedTuple):
     err_real: Any
     err_imag: Any
 
+    def times(self, real: Any, imag: Any) -> Wave:
+        """By a complex factor."""
+        return Wave(
+            real * self.real - imag * self.imag,
+            real * self.imag + imag * self.real,
+            real * self.err_real - imag * self.err_imag,
+            real * self.err_imag + imag * self.err_real,
+        )
+
 
 @dr.syntax
 def segment_wave(frame: Frame, ln: Line, length: Any, k: Any, rule: Rule, active: Any) -> Wave:

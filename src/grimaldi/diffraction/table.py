@@ -22,6 +22,7 @@ class Segment(NamedTuple):
     X1: Any
     e: Any
     length: Any
+    radius: Any  # of curvature of the surface along the ray, 0 where the rim is sharp
 
 
 class Piece(NamedTuple):
@@ -33,6 +34,7 @@ class Piece(NamedTuple):
     reach: Any  # half its length
     lit: Any  # normals of the faces at the middle, towards the source first
     dark: Any
+    loop: Any  # the silhouette that it belongs to (`grazing`)
     closed: Any  # 1 where two faces meet, 0 at the border of a sheet
     outward: Any
     behind: Any  # how far behind it its own body comes next
@@ -58,7 +60,7 @@ class Table(NamedTuple):
     def segment(self, i: Any) -> Segment:
         P, V = self.types.Packet, self.types.Vector
         a, b, c = (dr.gather(P, self.segments, 3 * i + j) for j in range(3))
-        return Segment(V(a.x, a.y, a.z), V(b.x, b.y, b.z), V(c.x, c.y, c.z), a.w)
+        return Segment(V(a.x, a.y, a.z), V(b.x, b.y, b.z), V(c.x, c.y, c.z), a.w, c.w)
 
     def piece(self, i: Any) -> Piece:
         P, V = self.types.Packet, self.types.Vector
@@ -71,6 +73,7 @@ class Table(NamedTuple):
             a.w,
             V(b.x, b.y, b.z),
             V(c.x, c.y, c.z),
+            c.w,
             b.w,
             V(d.x, d.y, d.z),
             d.w,
@@ -113,8 +116,17 @@ def _distance(source: Source, outline: Outline) -> float:
     return float(np.linalg.norm(v - t[:, None] * span, axis=1).min())
 
 
-def table(outline: Outline, source: Source, types: Types, ranges: NDArray[np.int64] | None = None) -> Table:
-    """Pack what a source sees; its pieces begin at the segments `ranges`, the last of which is their number (`cut`)."""
+def table(
+    outline: Outline,
+    source: Source,
+    types: Types,
+    ranges: NDArray[np.int64] | None = None,
+    loop: NDArray[np.int64] | None = None,
+) -> Table:
+    """Pack what a source sees; its pieces begin at the segments `ranges`, the last of which is their number (`cut`).
+
+    loop (n,): the silhouette that each segment belongs to, where X→P may graze others.
+    """
     ends = np.concatenate([outline.start, outline.end])
     low, high = ends.min(0), ends.max(0)
     # on a coarse grid, so that differences to it are exact and points stay as near each other as they were
@@ -124,16 +136,16 @@ def table(outline: Outline, source: Source, types: Types, ranges: NDArray[np.int
     X0, X1 = outline.start - centre, outline.end - centre
     length = np.linalg.norm(X1 - X0, axis=1, keepdims=True)
     zero = np.zeros_like(length)
-    segments = np.concatenate([X0, length, X1, zero, (X1 - X0) / length, zero], 1)
+    segments = np.concatenate([X0, length, X1, zero, (X1 - X0) / length, outline.radius[:, None]], 1)
     middle = (ranges[:-1] + ranges[1:]) // 2
     target = 0.5 * (X0[middle] + X1[middle])
     reach = 0.5 * np.add.reduceat(length[:, 0], ranges[:-1])[:, None]
     normals = outline.normals[middle]
     closed = (np.linalg.norm(normals[:, 1], axis=1) > 0).astype(float)[:, None]
-    none = np.zeros_like(reach)
+    of = np.zeros_like(reach) if loop is None else loop[middle][:, None]
     behind = np.minimum.reduceat(np.minimum(outline.behind, 1e30), ranges[:-1])[:, None]
     pieces = np.concatenate(
-        [target, reach, normals[:, 0], closed, normals[:, 1], none, outline.outward[middle], behind], 1
+        [target, reach, normals[:, 0], closed, normals[:, 1], of, outline.outward[middle], behind], 1
     )
     index = dr.uint32_array_t(types.Float)
     return Table(

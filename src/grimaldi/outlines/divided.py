@@ -27,6 +27,7 @@ def divided(outline: Outline, parts: Integers) -> Outline:
         outward=outline.outward[which],
         behind=outline.behind[which],
         chain=outline.chain[which],
+        radius=outline.radius[which],
     )
 
 
@@ -54,4 +55,5 @@ def joined(outline: Outline) -> Outline:
         outward=outline.outward[first],
         behind=np.minimum.reduceat(outline.behind, first),
         chain=outline.chain[first],
+        radius=outline.radius[first],
     )

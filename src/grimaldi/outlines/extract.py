@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from grimaldi.outlines import cylinder, disk, mesh, planar, sphere
+from grimaldi.outlines import curvature, cylinder, disk, mesh, planar, sphere
 from grimaldi.outlines.candidate import Candidates, toward
-from grimaldi.outlines.hidden import Obstacle, Queries, behind, obstacles
+from grimaldi.outlines.hidden import Obstacle, Queries, Triangles, behind, obstacles
 from grimaldi.outlines.lit import Stretches, lit_parts
 from grimaldi.outlines.model import Integers, Outline, Reals
 from grimaldi.scene.bodies import vertices
@@ -16,6 +16,7 @@ from grimaldi.scene.model import Body, Cylinder, Geometry, Mesh, Scene, Source, 
 from grimaldi.scene.planar import PlanarOutline
 
 LONGEST = 1 / 32  # of the outlines' extent: how finely X→P visibility is told along a straight edge
+HAIR = 1e-10  # of the coordinates
 DEFAULT_SAG = 1e-4  # of a curve's size, where no wavelength sets it
 
 
@@ -35,16 +36,31 @@ def outline(scene: Scene, source: Source, *, sag: Sequence[float] | None = None)
     if scene.screen:
         return _planar(scene, source, sag or [DEFAULT_SAG * curve(shape)[1] for shape in scene.screen])
     sag = sag or [DEFAULT_SAG * curve(body.geometry)[1] for body in scene.bodies]
-    parts = [_silhouette(body, source, s) for body, s in zip(scene.bodies, sag, strict=True)]
-    if not any(len(part.start) for part in parts):
+    edges, body = edges_of(scene, source, sag)
+    if not len(body):
         return Outline.empty()
-    body = np.repeat(np.arange(len(parts)), [len(part.start) for part in parts])
-    edges = Candidates.concatenate(parts)
-    extents = np.array([np.linalg.norm(np.ptp(part.start, axis=0)) if len(part.start) else 0.0 for part in parts])
+    extents = np.zeros(len(scene.bodies))
+    for i in np.unique(body):
+        extents[i] = np.linalg.norm(np.ptp(edges.start[body == i], axis=0))
     standing = obstacles(scene.bodies, source)
     lit = lit_parts(standing, source, edges, body, LONGEST * extents[body])
     coarsest = max((s for b, s in zip(scene.bodies, sag, strict=True) if is_curved(b.geometry)), default=0.0)
-    return assemble(edges, body, lit, gap_behind(standing, source, edges, body, lit), source, coarsest)
+    return assemble(
+        edges,
+        body,
+        lit,
+        gap_behind(standing, source, edges, body, lit),
+        source,
+        coarsest,
+        curvature.radii(scene.bodies, source, edges, body),
+    )
+
+
+def edges_of(scene: Scene, source: Source, sag: Sequence[float]) -> tuple[Candidates, Integers]:
+    """The silhouette edges of a scene's bodies, lit or not, and the body (n,) of each; sag as in `outline`."""
+    parts = [_silhouette(body, source, s) for body, s in zip(scene.bodies, sag, strict=True)]
+    body = np.repeat(np.arange(len(parts)), [len(part.start) for part in parts])
+    return Candidates.concatenate(parts or [Candidates.empty()]), body
 
 
 def curve(shape: Geometry | PlanarOutline) -> tuple[Reals, float]:
@@ -77,13 +93,19 @@ def _silhouette(body: Body, source: Source, sag: float) -> Candidates:
 def gap_behind(
     standing: tuple[Obstacle, ...], source: Source, edges: Candidates, body: Integers, lit: Stretches
 ) -> Reals:
-    """For each lit stretch, how far behind its middle its own body comes next."""
+    """For each lit stretch, how far behind its middle its own body comes next.
+
+    Of a mesh from a hair beside the edge, on its open side: where faces lie along the light the ray through the edge
+    itself runs within them and meets their neighbours at corners.
+    """
     c, at = lit.candidate, 0.5 * (lit.low + lit.high)
     x = edges.start[c] + at[:, None] * (edges.end[c] - edges.start[c])
+    beside = HAIR * np.abs(x).max(initial=0.0) * _outward(edges.start[c], edges.end[c], source)
     result = np.full(len(c), np.inf)
     for number, of in enumerate(standing):
         own = body[c] == number
-        result[own] = behind(of, source, Queries(x, body[c], edges.faces[c])[own])
+        places = x + beside if isinstance(of, Triangles) else x
+        result[own] = behind(of, source, Queries(places, body[c], edges.faces[c])[own])
     return result
 
 
@@ -98,8 +120,16 @@ def _planar(scene: Scene, source: Source, sag: Sequence[float]) -> Outline:
     return assemble(edges, np.concatenate(number), Stretches.whole(n), np.full(n, np.inf), source, max(sag))
 
 
-def assemble(edges: Candidates, body: Integers, lit: Stretches, behind: Reals, source: Source, sag: float) -> Outline:
-    """The lit stretches in the order of their chains."""
+def assemble(
+    edges: Candidates,
+    body: Integers,
+    lit: Stretches,
+    behind: Reals,
+    source: Source,
+    sag: float,
+    radius: Reals | None = None,
+) -> Outline:
+    """The lit stretches in the order of their chains; radius as in `Outline`, for each edge."""
     c = lit.candidate
     span = edges.end[c] - edges.start[c]
     start = np.where((lit.low > 0)[:, None], edges.start[c] + lit.low[:, None] * span, edges.start[c])
@@ -110,12 +140,18 @@ def assemble(edges: Candidates, body: Integers, lit: Stretches, behind: Reals, s
     order, chain = _chains(start, end)
     start, end, c = start[order], end[order], c[order]
     interval = np.stack([lit.low, lit.high], axis=1)[some][order]
-    ray = -toward(source, 0.5 * (start + end))
-    out = np.cross(end - start, ray)
-    size = np.linalg.norm(out, axis=1, keepdims=True)
     hole = (body[c] < 0)[:, None]  # a hole's open side is the one its loop encloses
-    outward = np.where(hole, -out, out) / np.maximum(size, 1e-300)
-    return Outline(start, end, body[c], edges.edge[c], interval, edges.normals[c], outward, behind[order], chain, sag)
+    outward = np.where(hole, -1, 1) * _outward(start, end, source)
+    radius = np.zeros(len(c)) if radius is None else radius[c]
+    return Outline(
+        start, end, body[c], edges.edge[c], interval, edges.normals[c], outward, behind[order], chain, radius, sag
+    )
+
+
+def _outward(start: Reals, end: Reals, source: Source) -> Reals:
+    """Unit vectors (n, 3) across edges and the light, away from the side on their left."""
+    out = np.cross(end - start, -toward(source, 0.5 * (start + end)))
+    return out / np.maximum(np.linalg.norm(out, axis=1, keepdims=True), 1e-300)
 
 
 def _chains(start: Reals, end: Reals) -> tuple[Integers, Integers]:

@@ -10,9 +10,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from grimaldi.outlines.candidate import Candidates, facing
+from grimaldi.outlines.candidate import Candidates, facing, toward
 from grimaldi.outlines.model import Integers, Reals
 from grimaldi.scene.model import Mesh, Source
+
+EDGE_ON = 1e-9  # cosine between a face's normal and the light
 
 
 def weld(mesh: Mesh) -> tuple[Reals, Integers]:
@@ -82,9 +84,23 @@ def normals_beside(
     n1, n2 = facing(source, unit[face1], x), facing(source, unit[face2], x)
     two = face2 >= 0
     # face2 is in front where it bulges out of the plane of face1 towards the source
-    bulge = np.einsum("ij,ikj->ik", n1, corners[face2] - x[:, None])
-    furthest = np.take_along_axis(bulge, np.abs(bulge).argmax(axis=1)[:, None], axis=1)[:, 0]
-    swap = two & (furthest > 0)
+    swap = two & (_bulge(n1, corners[face2], x) > 0)
     lit = np.where(swap[:, None], n2, n1)
     dark = np.where(two[:, None], -np.where(swap[:, None], n1, n2), 0.0)
-    return np.stack([lit, dark], axis=1), swap
+    # a face edge-on has no side that faces the source: its outside is where the other face is not
+    w = toward(source, x)
+    w = w / np.maximum(np.linalg.norm(w, axis=1, keepdims=True), 1e-300)
+    cosines = [np.einsum("ij,ij->i", n, w) for n in (n1, n2)]
+    edge_on = (two & (np.minimum(*cosines) < EDGE_ON))[:, None]
+    out1 = -n1 * np.sign(_bulge(n1, corners[face2], x))[:, None]
+    out2 = -n2 * np.sign(_bulge(n2, corners[face1], x))[:, None]
+    second = np.einsum("ij,ij->i", out2 - out1, w)[:, None] > 0
+    lit = np.where(edge_on, np.where(second, out2, out1), lit)
+    dark = np.where(edge_on, np.where(second, out1, out2), dark)
+    return np.stack([lit, dark], axis=1), np.where(edge_on, second, swap[:, None])[:, 0]
+
+
+def _bulge(normals: Reals, corners: Reals, x: Reals) -> Reals:
+    """How far the furthest corner of triangles (n, 3, 3) lies from the planes through x (n, 3), along their normals."""
+    heights = np.einsum("ij,ikj->ik", normals, corners - x[:, None])
+    return np.take_along_axis(heights, np.abs(heights).argmax(axis=1)[:, None], axis=1)[:, 0]

@@ -29,6 +29,7 @@ class Outline:
     outward: Reals  # (n, 3) unit, across the ray from the source, towards the open side
     behind: Reals  # (n,) how far behind it, along the ray, its own body comes next; inf behind outer outlines
     chain: Integers  # (n,) segments of one chain follow each other in the arrays, end to start
+    radius: Reals  # (n,) of curvature of the surface along the ray [scene units]; 0 where the rim is sharp
     sag: float = 0.0  # how far a segment may lie from the curve that it stands for [scene units]
     detour: float = 0.0  # how much Δ may err for that where the field is asked [scene units]
 
@@ -40,4 +41,6 @@ class Outline:
         """Nothing stands in the light."""
         none = np.empty(0, np.int64)
         points = np.empty((0, 3))
-        return Outline(points, points, none, none, np.empty((0, 2)), np.empty((0, 2, 3)), points, np.empty(0), none)
+        return Outline(
+            points, points, none, none, np.empty((0, 2)), np.empty((0, 2, 3)), points, np.empty(0), none, np.empty(0)
+        )

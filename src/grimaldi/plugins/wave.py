@@ -46,8 +46,15 @@ def register(V: Any) -> None:
            - "auto" or "double". (Default: "auto")
 
          * - occlusion
-           - |bool|
-           - Whether bodies block the way from an outline to a surface. (Default: true)
+           - |bool| or |string|
+           - How bodies block the way from an outline to a surface: true or "graded", by Fresnel's factor where it
+             grazes another silhouette (model "boundary"); "binary", by yes or no; false or "none", not at all.
+             (Default: true)
+
+         * - rim
+           - |string|
+           - How the model "boundary" takes the rims of smooth bodies: "sharp", as black screens, or "smooth", with
+             waves into the shadow damped like creeping waves. (Default: "sharp")
 
          * - n
            - |int| or |string|
@@ -109,7 +116,8 @@ def register(V: Any) -> None:
                 interference=bool(props.get("interference", True)),
                 tolerance=parameters.number(props, "tolerance", 1e-3),
                 precision=str(props.get("precision", "auto")),
-                occlusion=bool(props.get("occlusion", True)),
+                occlusion=props.get("occlusion", True),
+                rim=props.get("rim", "sharp"),
                 n=props.get("n", None),
                 weights=str(props.get("weights", "report")),
                 epsilon=props.get("epsilon", None),
