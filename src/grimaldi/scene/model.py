@@ -103,6 +103,7 @@ class Scene:
     name: str
     mitsuba: Any
     blockers: Any
+    surfaces: tuple[Geometry | None, ...]
     bodies: tuple[Body, ...]
     sources: tuple[Source, ...]
     holes: tuple[PlanarOutline, ...] = ()
