@@ -1,4 +1,4 @@
-"""Where rays meet surfaces, in Float64: Mitsuba's points are Float32, and their rounding may be a whole wavelength."""
+"""Where rays meet surfaces, in Float64: Mitsuba's points are Float32, and their rounding may be wavelengths."""
 
 from __future__ import annotations
 
@@ -32,8 +32,8 @@ class Hits(NamedTuple):
     def point(self, ray: Any, si: Any, active: Any) -> Any:
         """The point (`mi.Point3d`) where a ray meets the surface that Mitsuba's interaction names.
 
-        The ray's Float32 numbers count as exact. Mitsuba's own point is kept on shapes of other kinds, on active
-        rays alone, and where the surface is not within Float32's rounding of it.
+        The ray's Float32 numbers count as exact. Mitsuba's own point is kept on shapes of other kinds, and where
+        the surface is not within Float32's rounding of it. Rays: `mi.Ray3f`, interactions: `mi.SurfaceInteraction3f`.
         """
         double = types(double=True)
         F, V, P = double
@@ -62,7 +62,7 @@ class Hits(NamedTuple):
 
 
 def hits(scene: Scene) -> Hits:
-    """All surfaces of a scene that are flat or quadrics."""
+    """All surfaces of a scene that are flat or quadrics, for the Mitsuba variant in use."""
     index = indices(scene.mitsuba)
     shapes = np.zeros((int(index.max(initial=0)) + 1, 4))
     planes, quadrics = [np.zeros((1, 4))], [np.zeros((1, 3, 4))]  # the device cannot gather from nothing

@@ -145,9 +145,15 @@ def _geometry(shape: Any) -> Geometry | None:
         return Disk(to_world)
     if kind == "Cylinder":
         return Cylinder(to_world)
-    # Mitsuba drops a sphere's non-uniform scale, though to_world keeps it: the area tells what it renders.
-    area = float(np.array(shape.surface_area()).reshape(-1)[0])
-    return Sphere(to_world[:3, 3].copy(), float(np.sqrt(area / (4 * np.pi))))
+    return Sphere(to_world[:3, 3].copy(), _radius(shape, to_world))
+
+
+def _radius(shape: Any, to_world: Reals) -> float:
+    """A sphere's radius. Mitsuba drops a non-uniform scale that to_world keeps: the area tells what it renders."""
+    by_area = float(np.sqrt(float(np.array(shape.surface_area()).reshape(-1)[0]) / (4 * np.pi)))
+    scales = np.linalg.norm(to_world[:3, :3], axis=0)
+    uniform = np.allclose(scales, by_area, rtol=FLAT, atol=0)
+    return float(scales.mean()) if uniform else by_area  # the area is rounded once more
 
 
 def _to_world(shape: Any) -> Reals:
