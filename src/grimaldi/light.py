@@ -18,10 +18,11 @@ from grimaldi.conventions import Wavelength, parse_wavelengths
 from grimaldi.diffraction import model
 from grimaldi.diffraction.frame import toward
 from grimaldi.diffraction.model import Options, Receivers
+from grimaldi.engine.hits import Hits, hits
 from grimaldi.errors import InputError
 from grimaldi.options import checked_options
 from grimaldi.propagate import Wave, propagate
-from grimaldi.scene.bodies import vertices
+from grimaldi.scene.bodies import indices, vertices
 from grimaldi.scene.model import Mesh, Scene, Source
 
 
@@ -67,6 +68,7 @@ class Light:
     """All beams of a scene; `keys` are the pairs (wavelength, group) whose intensities add."""
 
     scene: Scene
+    hits: Hits
     beams: tuple[Beam, ...]
     keys: tuple[tuple[float, str], ...]
 
@@ -78,8 +80,9 @@ class Light:
                 raise InputError(f"wave: groups names {name!r}; the scene has {', '.join(dict.fromkeys(present))}")
         return [present.index(name) for name in names]
 
-    def reflected(self, si: Any, bsdf: Any, p: Any, n: Any, active: Any) -> Reflected:
-        """Eq. 3a at surface interactions: radiance towards the camera, and U of each key."""
+    def reflected(self, ray: Any, si: Any, bsdf: Any, n: Any, active: Any) -> Reflected:
+        """Eq. 3a where rays met surfaces: radiance back along them, and U of each key."""
+        p = self.hits.point(ray, si, active)
         context = mi.BSDFContext()
         zero = type(p.x)(0)
         real, imag, error = ([zero] * len(self.keys) for _ in range(3))
@@ -131,7 +134,7 @@ def prepare(scene: Scene, settings: Settings) -> Light:
         for wavelength in wavelengths
         for source in sources
     )
-    return Light(scene, beams, keys)
+    return Light(scene, hits(scene), beams, keys)
 
 
 class LightOf:
@@ -167,12 +170,13 @@ def _tint(source: Source) -> Any:
 
 
 def fingerprint(scene: Scene) -> bytes:
-    """Changes when a body, a source or a camera does."""
+    """Changes when a shape, a source or a camera does, and from one Mitsuba scene to the next."""
     digest = blake2b(digest_size=16)
-    for body in scene.bodies:
-        digest.update(np.ascontiguousarray(vertices(body.geometry)).tobytes())
-        if isinstance(body.geometry, Mesh):
-            digest.update(np.ascontiguousarray(body.geometry.faces).tobytes())
+    digest.update(indices(scene.mitsuba).tobytes())
+    for surface in scene.surfaces:
+        digest.update(b"-" if surface is None else np.ascontiguousarray(vertices(surface)).tobytes())
+        if isinstance(surface, Mesh):
+            digest.update(np.ascontiguousarray(surface.faces).tobytes())
     for planar in (*scene.screen, *(s.aperture for s in scene.sources if s.aperture is not None)):
         digest.update(np.concatenate([*planar.loops, planar.to_world[:, :2]], axis=None).tobytes())
     for s in scene.sources:

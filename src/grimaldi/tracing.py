@@ -81,7 +81,7 @@ def trace(
         # ---------------------- Diffracting sources ----------------------
         if scatters:
             n = mi.Vector3f(dr.mulsign(si.n, -dr.dot(si.n, ray.d)))
-            out = reflected(si, bsdf, mi.Point3d(si.p), n, scatters)
+            out = reflected(ray, si, bsdf, n, scatters)
             L += beta * out.L
             first = scatters & ~seen
             real = _where(first, out.real, real)

@@ -24,6 +24,7 @@ _SQUARE = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
 class Shapes:
     """A scene's shapes by what they do to waves."""
 
+    surfaces: tuple[Geometry | None, ...]  # of every shape; None of kinds other than those of `Geometry`
     bodies: tuple[Body, ...]
     holes: tuple[PlanarOutline, ...]
     others: tuple[str, ...]  # names of the shapes that do not diffract yet
@@ -37,18 +38,21 @@ def sort_shapes(shapes: Iterable[Any]) -> Shapes:
     Raises:
         InputError: an aperture that is no rectangle, disk or planar mesh.
     """
+    surfaces: list[Geometry | None] = []
     bodies: list[Body] = []
     holes: list[PlanarOutline] = []
     others: list[str] = []
     for index, shape in enumerate(shapes):
         name = shape.id() or f"{shape.class_name()} {index}"
+        surface = _geometry(shape)
+        surfaces.append(surface)
         if getattr(shape.bsdf(), "plugin_name", None) == "aperture":
             holes.append(planar_outline(shape, name))
-        elif _is_opaque(shape):
-            bodies.append(Body(name, index, _geometry(shape)))
+        elif surface is not None and _is_opaque(shape):
+            bodies.append(Body(name, index, surface))
         else:
             others.append(name)
-    return Shapes(tuple(bodies), tuple(holes), tuple(others))
+    return Shapes(tuple(surfaces), tuple(bodies), tuple(holes), tuple(others))
 
 
 def blockers(mi_scene: Any) -> Any:
@@ -75,6 +79,14 @@ def _lets_through(shape: Any) -> bool:
 
     bsdf = shape.bsdf()
     return bsdf is not None and bool(bsdf.flags() & int(mi.BSDFFlags.Null))
+
+
+def indices(mi_scene: Any) -> NDArray[np.uint32]:
+    """Mitsuba's numbers (n,) of the shapes of `mi.Scene.shapes()`, which a pointer to one, `si.shape`, holds."""
+    import drjit as dr
+    import mitsuba as mi
+
+    return np.array(dr.reinterpret_array(mi.UInt32, mi_scene.shapes_dr()), dtype=np.uint32)
 
 
 def front(shape: Any) -> Reals:
@@ -116,26 +128,32 @@ def is_flat(points: Reals) -> bool:
 def _is_opaque(shape: Any) -> bool:
     import mitsuba as mi
 
-    mesh = shape.is_mesh() and shape.class_name() != "EllipsoidsMesh"
-    if not (mesh or shape.class_name() in ("Sphere", "Disk", "Cylinder")) or shape.is_medium_transition():
-        return False
     bsdf = shape.bsdf()
-    return bsdf is not None and not bsdf.flags() & int(mi.BSDFFlags.Transmission)
+    return not shape.is_medium_transition() and bsdf is not None and not bsdf.flags() & int(mi.BSDFFlags.Transmission)
 
 
-def _geometry(shape: Any) -> Geometry:
-    if shape.is_mesh():
+def _geometry(shape: Any) -> Geometry | None:
+    kind = shape.class_name()
+    if shape.is_mesh() and kind != "EllipsoidsMesh":
         positions = np.array(shape.vertex_positions_buffer(), dtype=np.float64).reshape(-1, 3)
         faces = np.array(shape.faces_buffer(), dtype=np.int64).reshape(-1, 3)
         return Mesh(positions, faces)
+    if kind not in ("Sphere", "Disk", "Cylinder"):
+        return None
     to_world = _to_world(shape)
-    if shape.class_name() == "Disk":
+    if kind == "Disk":
         return Disk(to_world)
-    if shape.class_name() == "Cylinder":
+    if kind == "Cylinder":
         return Cylinder(to_world)
-    # Mitsuba drops a sphere's non-uniform scale, though to_world keeps it: the area tells what it renders.
-    area = float(np.array(shape.surface_area()).reshape(-1)[0])
-    return Sphere(to_world[:3, 3].copy(), float(np.sqrt(area / (4 * np.pi))))
+    return Sphere(to_world[:3, 3].copy(), _radius(shape, to_world))
+
+
+def _radius(shape: Any, to_world: Reals) -> float:
+    """A sphere's radius. Mitsuba drops a non-uniform scale that to_world keeps: the area tells what it renders."""
+    by_area = float(np.sqrt(float(np.array(shape.surface_area()).reshape(-1)[0]) / (4 * np.pi)))
+    scales = np.linalg.norm(to_world[:3, :3], axis=0)
+    uniform = np.allclose(scales, by_area, rtol=FLAT, atol=0)
+    return float(scales.mean()) if uniform else by_area  # the area is rounded once more
 
 
 def _to_world(shape: Any) -> Reals:
@@ -154,10 +172,9 @@ def planar_outline(shape: Any, name: str) -> PlanarOutline:
         return PlanarOutline(_SQUARE, _to_world(shape))
     if shape.class_name() == "Disk":
         return PlanarOutline.ellipse(_to_world(shape))
-    if not shape.is_mesh():
-        raise InputError(f"{name}: an aperture must be planar; use a rectangle, a disk or a planar mesh")
     mesh = _geometry(shape)
-    assert isinstance(mesh, Mesh)
+    if not isinstance(mesh, Mesh):
+        raise InputError(f"{name}: an aperture must be planar; use a rectangle, a disk or a planar mesh")
     return _mesh_hole(mesh, name)
 
 

@@ -94,6 +94,7 @@ def _read(scene: Any, coherent: Collection[str]) -> Scene:
         name=name,
         mitsuba=mi_scene,
         blockers=blockers(mi_scene),
+        surfaces=shapes.surfaces,
         bodies=shapes.bodies,
         sources=found,
         holes=shapes.holes,

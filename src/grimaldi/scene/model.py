@@ -96,13 +96,15 @@ class Scene:
 
     `mitsuba` is the whole scene as the camera sees it; `blockers` holds only what stops light
     (apertures, null and mask surfaces left out) and is what visibility rays are traced in, None where
-    there is nothing. `holes` are the openings of one infinite opaque screen, `masks` opaque planar
-    outlines without a shape of their own.
+    there is nothing. `surfaces` are all of `mi.Scene.shapes()`, bodies or not, None for kinds that are no
+    `Geometry`. `holes` are the openings of one infinite opaque screen, `masks` opaque planar outlines
+    without a shape of their own.
     """
 
     name: str
     mitsuba: Any
     blockers: Any
+    surfaces: tuple[Geometry | None, ...]
     bodies: tuple[Body, ...]
     sources: tuple[Source, ...]
     holes: tuple[PlanarOutline, ...] = ()

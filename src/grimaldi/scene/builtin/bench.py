@@ -1,7 +1,7 @@
 """What the textbook scenes share: an optical bench along z, in millimetres, its screen at z = 0.
 
-The screen lies in the plane z = 0 because Mitsuba's points are Float32: there z is exact, and x and y,
-small numbers, are good to a small part of the wavelength. Light comes from +z.
+The screen lies in the plane z = 0, where z is exact though rays are Float32, and x and y, small numbers, are good to a
+small part of the wavelength. Light comes from +z.
 """
 
 from __future__ import annotations
