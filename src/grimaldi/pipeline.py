@@ -29,6 +29,7 @@ def field(
     n: int | Literal["nyquist"] | None = None,
     weights: Literal["report", "length", "kernel"] = "report",
     epsilon: float | None = None,
+    smooth: int = 0,
     **unknown: Any,
 ) -> xr.Dataset:
     """The complex field of a scene's sources at points.
@@ -52,6 +53,7 @@ def field(
             "boundary" as n grows).
         epsilon: how far beside an edge the silhouette test of "report" looks [scene units]; 2e-4 of the body's size
             unless given.
+        smooth: levels by which meshes with vertex normals are divided, as in `grimaldi.load`.
 
     Returns:
         Dataset with `U` complex128 (wavelength, group, point) by eq. 1-2 and 4-6, `intensity` float64 (point) by
@@ -75,7 +77,7 @@ def field(
     p = checked_points(points)
     options = checked_options(tolerance, precision, occlusion, n, weights, epsilon)
     factor = model(diffraction)
-    loaded = load(scene, scene_unit=scene_unit)
+    loaded = load(scene, scene_unit=scene_unit, smooth=smooth)
     wavelengths = parse_wavelengths(loaded.wavelength if wavelength is None else wavelength, loaded.unit)
     require_sources(loaded)
     sources = loaded.sources if interference else separated(loaded.sources)

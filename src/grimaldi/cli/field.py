@@ -32,6 +32,7 @@ def field(
     n: options.N = None,
     weights: options.Weights = None,
     epsilon: options.Epsilon = None,
+    smooth: options.Smooth = None,
     variant: options.Variant = None,
 ) -> None:
     """Compute the complex field of SCENE at points."""
@@ -52,6 +53,7 @@ def field(
         n=options.number(n),
         weights=weights,
         epsilon=epsilon,
+        smooth=smooth,
     )
     options.set_variant(variant)
 

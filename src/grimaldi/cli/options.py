@@ -48,6 +48,10 @@ Weights = Annotated[
 Epsilon = Annotated[
     float | None, typer.Option(help="Of the report's silhouette test, in scene units.", metavar="LENGTH")
 ]
+Smooth = Annotated[
+    int | None,
+    typer.Option(help="Divide meshes with vertex normals into curved surfaces.  [default: 0]", metavar="LEVELS"),
+]
 Variant = Annotated[
     str | None, typer.Option(help="Mitsuba's variant, such as llvm_ad_rgb.  [default: the best that works]")
 ]

@@ -1,0 +1,225 @@
+"""Meshes with vertex normals, divided into the curved surfaces that they stand for.
+
+Each face becomes the cubic Bézier triangle through its three points, perpendicular to their three normals there:
+A. Vlachos, J. Peters, C. Boyd, J. L. Mitchell, "Curved PN Triangles", Symposium on Interactive 3D Graphics 2001,
+pp. 159-166. Its distance from the surface falls with the fourth power of the edges, a flat face's with the second.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from grimaldi.errors import InputError
+from grimaldi.scene.bodies import FLAT, Surface, carries_light, is_aperture, surface, with_shapes
+from grimaldi.scene.triangles import as_mesh, check_triangles
+
+Reals = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+DEEPEST = 6  # levels: 4096 faces for one
+MOST_FACES = 4_000_000  # of one finer mesh
+AGREE = 1e-6  # 1 - |cos| of the angle between normals that are one: 1.4e-3 rad, well above what files round
+
+
+def check_levels(levels: object) -> None:
+    """Raises InputError for what is no integer from 0 to 6."""
+    if not isinstance(levels, int) or isinstance(levels, bool) or not 0 <= levels <= DEEPEST:
+        raise InputError(f"smooth: {levels!r} is no number of levels; give an integer from 0 to {DEEPEST}")
+
+
+def smooth_meshes(mi_scene: Any, levels: int) -> Any:
+    """A Mitsuba scene whose meshes with vertex normals are divided into 4^levels curved parts a face.
+
+    All else is shared with `mi_scene`, which is returned itself where nothing bends. Left as they are: flat meshes,
+    meshes shaded by their faces (`face_normals`), apertures, and shapes that emitters or sensors sit on.
+
+    Raises InputError where a mesh would have more than 4e6 faces.
+    """
+    if levels == 0:
+        return mi_scene
+    before = mi_scene.shapes()
+    after = [_smoothed(shape, levels) for shape in before]
+    if all(new is old for new, old in zip(after, before, strict=True)):
+        return mi_scene
+    return with_shapes(mi_scene, after)
+
+
+def _smoothed(shape: Any, levels: int) -> Any:
+    """The finer mesh of a shape that bends, with its BSDF, media, flags and id; any other shape itself."""
+    import mitsuba as mi
+
+    coarse = None if is_aperture(shape) or carries_light(shape) else surface(shape)
+    if coarse is None:
+        return shape
+    name = shape.id() or shape.class_name()
+    check_triangles(coarse.vertices, coarse.faces, name)
+    faces = len(coarse.faces) * 4**levels
+    if faces > MOST_FACES:
+        raise InputError(f"{name}: smooth={levels} makes {faces} faces of it, more than {MOST_FACES}; give less")
+    fine = subdivided(coarse, levels)
+    if fine is coarse:
+        return shape
+    props = mi.Properties()
+    props["flip_normals"] = shape.has_flipped_normals()
+    parts = {"bsdf": shape.bsdf(), "interior": shape.interior_medium(), "exterior": shape.exterior_medium()}
+    for key, part in parts.items():
+        if part is not None:
+            props[key] = part
+    mesh = as_mesh(mi, name, fine.vertices, fine.faces, props, normals=fine.normals, uv=fine.uv)
+    for key, values in fine.attributes.items():
+        mesh.add_attribute(key, values.shape[1], mi.Float(values.astype(np.float32).ravel()))
+    mesh.set_id(shape.id())
+    return mesh
+
+
+def subdivided(coarse: Surface, levels: int) -> Surface:
+    """A surface with each face divided into 4^levels; itself where all its faces are flat.
+
+    Faces that share an edge share its curve, bit for bit. Where their normals differ at one of its ends the surface has
+    a crease, and the edge stays straight. Normals and all other values are interpolated linearly, the normals at unit
+    length, so that shading stays as it was.
+    """
+    n = 2**levels
+    edges = _edges(coarse)
+    curves = _curves(coarse, edges)
+    if curves is None:
+        return coarse
+    lattice = _lattice(n)
+    names = [name for name in coarse.attributes if name.startswith("vertex_")]
+    columns = [coarse.normals, *([] if coarse.uv is None else [coarse.uv]), *(coarse.attributes[x] for x in names)]
+    linear = np.concatenate(columns, axis=1)
+
+    t = np.arange(1, n)[:, None] / n
+    along = _bernstein(t) @ curves
+    inner = lattice.cubic @ _patches(coarse, edges, curves)
+    vertices = np.concatenate([coarse.vertices, along[edges.curve].reshape(-1, 3), inner.reshape(-1, 3)])
+    between = np.concatenate([1 - t, t], axis=1) @ linear[edges.ends]
+    within = lattice.weights[lattice.inner] @ linear[coarse.faces]
+    linear = np.concatenate([linear, *(x.reshape(-1, linear.shape[1]) for x in (between, within))])
+
+    splits = np.cumsum([x.shape[1] for x in columns])[:-1]
+    normals, *rest = np.split(linear, splits, axis=1)
+    uv = None if coarse.uv is None else rest.pop(0)
+    attributes = dict(zip(names, rest, strict=True))
+    attributes |= {name: np.repeat(x, n * n, axis=0) for name, x in coarse.attributes.items() if name not in names}
+    faces = _numbers(coarse, edges, lattice, n)[:, lattice.triangles].reshape(-1, 3)
+    return Surface(vertices, faces, normals=_unit(normals), uv=uv, attributes=attributes)
+
+
+@dataclass(frozen=True, eq=False)
+class _Edges:
+    """A mesh's edges (e), each in the direction that all edges in its place have."""
+
+    ends: Integers  # (e, 2) vertices
+    of_side: Integers  # (m, 3) the edge of each face's side, from corner 0 to 1, 1 to 2, 2 to 0
+    forward: NDArray[np.bool_]  # (m, 3) whether that side runs along its edge
+    curve: Integers  # (e,) which of the c curves it is: edges of different vertices may lie in one place
+    first: Integers  # (c,) the edge that makes the curve
+    crease: NDArray[np.bool_]  # (c,) whether edges of the curve have different normals
+
+
+def _edges(mesh: Surface) -> _Edges:
+    count = len(mesh.vertices)
+    _, place = np.unique(mesh.vertices + 0.0, axis=0, return_inverse=True)  # -0.0 becomes 0.0
+    place = place.reshape(-1)
+    rank = np.empty(count, np.int64)
+    rank[np.argsort(place, kind="stable")] = np.arange(count)
+    side = np.stack([mesh.faces, np.roll(mesh.faces, -1, axis=1)], axis=2)
+    forward = rank[side[..., 0]] < rank[side[..., 1]]
+    side = np.where(forward[..., None], side, side[..., ::-1]).reshape(-1, 2)
+    _, one, of_side = np.unique(rank[side[:, 0]] * count + rank[side[:, 1]], return_index=True, return_inverse=True)
+    ends = side[one]
+    _, first, curve = np.unique(place[ends[:, 0]] * count + place[ends[:, 1]], return_index=True, return_inverse=True)
+    unit = _unit(mesh.normals)
+    cos = np.einsum("eij,eij->ei", unit[ends], unit[ends[first[curve]]])
+    differ = ~(np.abs(cos) > 1 - AGREE).all(axis=1)
+    crease = np.bincount(curve, differ, minlength=len(first)) > 0
+    return _Edges(ends, of_side.reshape(-1, 3), forward, curve, first, crease)
+
+
+def _curves(mesh: Surface, edges: _Edges) -> Reals | None:
+    """Control points (c, 4, 3) of the cubic curves in the edges' places; None where all are straight.
+
+    Vlachos et al. 2001, section 3.1: b210 = (2 P1 + P2 - w12 N1) / 3, w12 = (P2 - P1)·N1.
+    """
+    ends = edges.ends[edges.first]
+    start, end = np.moveaxis(mesh.vertices[ends], 1, 0)
+    chord = end - start
+    normals = np.where(edges.crease[:, None, None], 0, _unit(mesh.normals)[ends])
+    lift = np.einsum("ejk,ek->ej", normals, chord)[..., None] * normals
+    reach = np.ptp(mesh.vertices, axis=0).max() + np.abs(mesh.vertices).max()
+    if np.abs(lift).max() <= FLAT * reach:
+        return None
+    return np.stack([start, start + (chord - lift[:, 0]) / 3, end - (chord - lift[:, 1]) / 3, end], axis=1)
+
+
+def _patches(mesh: Surface, edges: _Edges, curves: Reals) -> Reals:
+    """Control points (m, 10, 3): the corners, two beside each corner along the sides, b111 = E + (E - V) / 2."""
+    corners = mesh.vertices[mesh.faces]
+    sides = curves[edges.curve[edges.of_side]][:, :, 1:3]
+    sides = np.where(edges.forward[..., None, None], sides, sides[:, :, ::-1]).reshape(-1, 6, 3)
+    e, v = sides.mean(axis=1, keepdims=True), corners.mean(axis=1, keepdims=True)
+    return np.concatenate([corners, sides, e + (e - v) / 2], axis=1)
+
+
+class _Lattice(NamedTuple):
+    """The points of a divided triangle: (l, 3) barycentric weights."""
+
+    steps: Integers  # (l, 3) the weights times n
+    weights: Reals
+    inner: NDArray[np.bool_]  # (l,) those on no side
+    cubic: Reals  # (inner, 10) weights of the patch's control points
+    triangles: Integers  # (n², 3)
+
+
+@cache
+def _lattice(n: int) -> _Lattice:
+    b, c = np.array([(b, c) for c in range(n + 1) for b in range(n + 1 - c)]).T
+    steps = np.stack([n - b - c, b, c], axis=1)
+    inner = np.all(steps > 0, axis=1)
+    u, v, w = (steps[inner] / n).T
+    sides = [3 * x for p, q in ((u, v), (v, w), (w, u)) for x in (p * p * q, p * q * q)]
+    cubic = np.stack([u**3, v**3, w**3, *sides, 6 * u * v * w], axis=1)
+
+    def at(b: Integers, c: Integers) -> Integers:
+        return c * (n + 1) - c * (c - 1) // 2 + b
+
+    upward = steps[:, 0] >= 1
+    downward = steps[:, 0] >= 2
+    up = [at(b + i, c + j)[upward] for i, j in ((0, 0), (1, 0), (0, 1))]
+    down = [at(b + i, c + j)[downward] for i, j in ((1, 0), (1, 1), (0, 1))]
+    triangles = np.concatenate([np.stack(up, axis=1), np.stack(down, axis=1)])
+    return _Lattice(steps, steps / n, inner, cubic, triangles)
+
+
+def _numbers(mesh: Surface, edges: _Edges, lattice: _Lattice, n: int) -> Integers:
+    """The finer mesh's vertex (m, l) at each point of each face: the corners come first, then edges, then insides."""
+    m, count = len(mesh.faces), len(mesh.vertices)
+    result = np.empty((m, len(lattice.steps)), np.int64)
+    for corner in range(3):
+        result[:, lattice.steps[:, corner] == n] = mesh.faces[:, [corner]]
+    step = np.arange(1, n)
+    for side in range(3):
+        near = lattice.steps[:, side]
+        on = np.flatnonzero((lattice.steps[:, side - 1] == 0) & (near > 0) & (near < n))
+        on = on[np.argsort(-near[on])]  # from the side's first corner to its second
+        along = np.where(edges.forward[:, [side]], step, n - step)
+        result[:, on] = count + edges.of_side[:, [side]] * (n - 1) + along - 1
+    inside = int(lattice.inner.sum())
+    result[:, lattice.inner] = count + len(edges.ends) * (n - 1) + np.arange(m * inside).reshape(m, inside)
+    return result
+
+
+def _bernstein(t: Reals) -> Reals:
+    return np.concatenate([(1 - t) ** 3, 3 * t * (1 - t) ** 2, 3 * t * t * (1 - t), t**3], axis=1)
+
+
+def _unit(normals: Reals) -> Reals:
+    """At length 1; 0 where there is no direction."""
+    size = np.linalg.norm(normals, axis=1, keepdims=True)
+    return np.divide(normals, size, out=np.zeros_like(normals), where=size > 0)
