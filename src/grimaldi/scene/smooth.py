@@ -7,7 +7,7 @@ pp. 159-166. Its distance from the surface falls with the fourth power of the ed
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any, NamedTuple
 
@@ -23,7 +23,7 @@ Integers = NDArray[np.int64]
 
 DEEPEST = 6  # levels: 4096 faces for one
 MOST_FACES = 4_000_000  # of one finer mesh
-AGREE = 1e-6  # 1 - |cos| of the angle between normals that are one: 1.4e-3 rad, well above what files round
+SHARP = 0.1  # sine of the angle between normals at a crease; those nearer to each other count as their mean
 
 
 def check_levels(levels: object) -> None:
@@ -80,15 +80,17 @@ def _smoothed(shape: Any, levels: int) -> Any:
 def subdivided(coarse: Surface, levels: int) -> Surface:
     """A surface with each face divided into 4^levels; itself where all its faces are flat.
 
-    Faces that share an edge share its curve, bit for bit. Where their normals differ at one of its ends the surface has
-    a crease, and the edge stays straight. Normals and all other values are interpolated linearly, the normals at unit
-    length, so that shading stays as it was.
+    Faces that share an edge share its curve, bit for bit; at a crease, where their normals differ, it is tangent to
+    both faces' planes. Normals and all other values are interpolated linearly, the normals at unit length, so that
+    shading stays as it was.
     """
     n = 2**levels
-    edges = _edges(coarse)
+    place = _places(coarse)
+    given, coarse = coarse, _without_empty(coarse, place)
+    edges = _edges(coarse, place)
     curves = _curves(coarse, edges)
     if curves is None:
-        return coarse
+        return given
     lattice = _lattice(n)
     names = [name for name in coarse.attributes if name.startswith("vertex_")]
     columns = [coarse.normals, *([] if coarse.uv is None else [coarse.uv]), *(coarse.attributes[x] for x in names)]
@@ -119,14 +121,24 @@ class _Edges:
     of_side: Integers  # (m, 3) the edge of each face's side, from corner 0 to 1, 1 to 2, 2 to 0
     forward: NDArray[np.bool_]  # (m, 3) whether that side runs along its edge
     curve: Integers  # (e,) which of the c curves it is: edges of different vertices may lie in one place
-    first: Integers  # (c,) the edge that makes the curve
-    crease: NDArray[np.bool_]  # (c,) whether edges of the curve have different normals
+    first: Integers  # (c,) an edge of each curve
 
 
-def _edges(mesh: Surface) -> _Edges:
+def _places(mesh: Surface) -> Integers:
+    """A number (n,) for each vertex, the same for those that lie in one place."""
+    return np.unique(mesh.vertices + 0.0, axis=0, return_inverse=True)[1].reshape(-1)  # -0.0 becomes 0.0
+
+
+def _without_empty(mesh: Surface, place: Integers) -> Surface:
+    """Without faces that have two corners in one place, as at the poles of a sphere: their patches would stick out."""
+    corners = place[mesh.faces]
+    whole = np.all(corners != np.roll(corners, 1, axis=1), axis=1)
+    attributes = {name: x if name.startswith("vertex_") else x[whole] for name, x in mesh.attributes.items()}
+    return replace(mesh, faces=mesh.faces[whole], attributes=attributes)
+
+
+def _edges(mesh: Surface, place: Integers) -> _Edges:
     count = len(mesh.vertices)
-    _, place = np.unique(mesh.vertices + 0.0, axis=0, return_inverse=True)  # -0.0 becomes 0.0
-    place = place.reshape(-1)
     rank = np.empty(count, np.int64)
     rank[np.argsort(place, kind="stable")] = np.arange(count)
     side = np.stack([mesh.faces, np.roll(mesh.faces, -1, axis=1)], axis=2)
@@ -135,11 +147,7 @@ def _edges(mesh: Surface) -> _Edges:
     _, one, of_side = np.unique(rank[side[:, 0]] * count + rank[side[:, 1]], return_index=True, return_inverse=True)
     ends = side[one]
     _, first, curve = np.unique(place[ends[:, 0]] * count + place[ends[:, 1]], return_index=True, return_inverse=True)
-    unit = _unit(mesh.normals)
-    cos = np.einsum("eij,eij->ei", unit[ends], unit[ends[first[curve]]])
-    differ = ~(np.abs(cos) > 1 - AGREE).all(axis=1)
-    crease = np.bincount(curve, differ, minlength=len(first)) > 0
-    return _Edges(ends, of_side.reshape(-1, 3), forward, curve, first, crease)
+    return _Edges(ends, of_side.reshape(-1, 3), forward, curve, first)
 
 
 def _curves(mesh: Surface, edges: _Edges) -> Reals | None:
@@ -150,12 +158,36 @@ def _curves(mesh: Surface, edges: _Edges) -> Reals | None:
     ends = edges.ends[edges.first]
     start, end = np.moveaxis(mesh.vertices[ends], 1, 0)
     chord = end - start
-    normals = np.where(edges.crease[:, None, None], 0, _unit(mesh.normals)[ends])
-    lift = np.einsum("ejk,ek->ej", normals, chord)[..., None] * normals
+    normals = _unit(mesh.normals)
+    tangents = [_tangent(chord, *_two_normals(normals[edges.ends[:, i]], edges)) for i in range(2)]
     reach = np.ptp(mesh.vertices, axis=0).max() + np.abs(mesh.vertices).max()
-    if np.abs(lift).max() <= FLAT * reach:
+    if max(np.abs(chord - tangent).max(initial=0) for tangent in tangents) <= FLAT * reach:
         return None
-    return np.stack([start, start + (chord - lift[:, 0]) / 3, end - (chord - lift[:, 1]) / 3, end], axis=1)
+    return np.stack([start, start + tangents[0] / 3, end - tangents[1] / 3, end], axis=1)
+
+
+def _two_normals(normals: Reals, edges: _Edges) -> tuple[Reals, Reals]:
+    """Of the normals (e, 3) at one end of the edges: for each curve that of one edge, and the one most unlike it."""
+    one = normals[edges.first]
+    cos = np.abs(np.einsum("ij,ij->i", normals, one[edges.curve]))
+    order = np.lexsort((cos, edges.curve))
+    most = order[np.searchsorted(edges.curve[order], np.arange(len(one)))]
+    return one, normals[most]
+
+
+def _tangent(chord: Reals, one: Reals, two: Reals) -> Reals:
+    """The chords (c, 3) projected into the tangent plane at an end; at a crease, onto the line where two planes meet.
+
+    Where that line leads away from the chord the normals tell nothing of the crease, and it is straight there.
+    """
+    turned = np.where(np.einsum("ij,ij->i", one, two)[:, None] < 0, -two, two)
+    line, mean = np.cross(one, turned), _unit(one + turned)
+    crease = np.linalg.norm(line, axis=1, keepdims=True) > SHARP
+    line = _unit(line)
+    on_line = np.einsum("ij,ij->i", chord, line)[:, None] * line
+    in_plane = chord - np.einsum("ij,ij->i", chord, mean)[:, None] * mean
+    astray = 2 * np.linalg.norm(on_line, axis=1) < np.linalg.norm(chord, axis=1)
+    return np.where(crease, np.where(astray[:, None], chord, on_line), in_plane)
 
 
 def _patches(mesh: Surface, edges: _Edges, curves: Reals) -> Reals:
