@@ -125,6 +125,19 @@ def test_distance_from_a_sphere_falls_with_the_fourth_power_of_the_edges(make, s
     assert curved[-1] < 0.02 * flat[-1]
 
 
+@pytest.mark.parametrize(
+    ("level", "faces", "patch"),
+    [(2, (1.8e-2, 4.8e-3, 1.6e-3, 7.4e-4), 4.7e-4), (3, (4.5e-3, 1.2e-3, 3.1e-4, 1.0e-4), 3.1e-5)],
+)
+def test_distances_are_those_of_the_documentation(level, faces, patch):
+    """docs/limits.md: how far inside the sphere the faces of 320 and 1280 lie, and their patches."""
+    ball = icosphere(level)
+    divided = [ball, *(subdivided(ball, smooth) for smooth in (1, 2, 3))]
+    inside = [1 - np.linalg.norm(s.vertices[s.faces].mean(axis=1), axis=1).min() for s in divided]
+    assert inside == pytest.approx(faces, rel=0.05)
+    assert 1 - np.linalg.norm(subdivided(ball, 5).vertices, axis=1).min() == pytest.approx(patch, rel=0.05)
+
+
 def test_a_crease_is_the_line_where_its_faces_planes_meet():
     """The rim of a can becomes a circle in the plane of its lid, to the fourth power of the edges."""
     counts, errors = (8, 16, 32), []
@@ -137,9 +150,10 @@ def test_a_crease_is_the_line_where_its_faces_planes_meet():
 
 
 def test_a_crease_without_a_direction_stays_straight():
-    """Two faces whose normals' planes meet across their common edge, not along it."""
+    """Two faces whose normals' planes meet far from the direction of their common edge."""
     points = [[0, 0, 0], [1, 0, 0], [0.5, 1, 0], [0, 0, 0], [1, 0, 0], [0.5, -1, 0]]
-    normals = np.array([[0.6, 0, 0.8]] * 3 + [[-0.6, 0, 0.8]] * 3)
+    across = np.array([np.sin(1.2), -np.cos(1.2), 0])  # perpendicular to where they meet, 1.2 rad from the edge
+    normals = np.repeat([0.6 * across + [0, 0, 0.8], -0.6 * across + [0, 0, 0.8]], 3, axis=0)
     fine = subdivided(surface(points, [[0, 1, 2], [4, 3, 5]], normals), 2)
     edge = fine.vertices[np.abs(fine.vertices[:, 1]) < 1e-12]
     assert len(edge) == 10
