@@ -58,10 +58,7 @@ def _smoothed(shape: Any, levels: int) -> Any:
         return shape
     name = shape.id() or shape.class_name()
     check_triangles(coarse.vertices, coarse.faces, name)
-    faces = len(coarse.faces) * 4**levels
-    if faces > MOST_FACES:
-        raise InputError(f"{name}: smooth={levels} makes {faces} faces of it, more than {MOST_FACES}; give less")
-    fine = subdivided(coarse, levels)
+    fine = subdivided(coarse, levels, name)
     if fine is coarse:
         return shape
     props = mi.Properties()
@@ -77,40 +74,46 @@ def _smoothed(shape: Any, levels: int) -> Any:
     return mesh
 
 
-def subdivided(coarse: Surface, levels: int) -> Surface:
+def subdivided(coarse: Surface, levels: int, place: str = "mesh") -> Surface:
     """A surface with each face divided into 4^levels; itself where all its faces are flat.
 
     Faces that share an edge share its curve, bit for bit; at a crease, where their normals differ, it is tangent to
     both faces' planes. Normals and all other values are interpolated linearly, the normals at unit length, so that
     shading stays as it was.
+
+    Raises InputError naming the mesh, `place`, where it would have more than 4e6 faces.
     """
     n = 2**levels
-    place = _places(coarse)
-    given, coarse = coarse, _without_empty(coarse, place)
-    edges = _edges(coarse, place)
+    at = _positions(coarse)
+    given, coarse = coarse, _without_empty(coarse, at)
+    edges = _edges(coarse, at)
     curves = _curves(coarse, edges)
     if curves is None:
         return given
+    count = len(coarse.faces) * n * n
+    if count > MOST_FACES:
+        raise InputError(f"{place}: smooth={levels} makes {count} faces of it, more than {MOST_FACES}; give less")
     lattice = _lattice(n)
-    names = [name for name in coarse.attributes if name.startswith("vertex_")]
-    columns = [coarse.normals, *([] if coarse.uv is None else [coarse.uv]), *(coarse.attributes[x] for x in names)]
-    linear = np.concatenate(columns, axis=1)
+    along = _bernstein(np.arange(1, n) / n) @ curves
+    inside = lattice.cubic @ _patches(coarse, edges, curves)
+    vertices = np.concatenate([coarse.vertices, along[edges.curve].reshape(-1, 3), inside.reshape(-1, 3)])
 
-    t = np.arange(1, n)[:, None] / n
-    along = _bernstein(t) @ curves
-    inner = lattice.cubic @ _patches(coarse, edges, curves)
-    vertices = np.concatenate([coarse.vertices, along[edges.curve].reshape(-1, 3), inner.reshape(-1, 3)])
-    between = np.concatenate([1 - t, t], axis=1) @ linear[edges.ends]
-    within = lattice.weights[lattice.inner] @ linear[coarse.faces]
-    linear = np.concatenate([linear, *(x.reshape(-1, linear.shape[1]) for x in (between, within))])
+    def linear(values: Reals) -> Reals:
+        t = np.arange(1, n)[:, None] / n
+        along = np.concatenate([1 - t, t], axis=1) @ values[edges.ends]
+        inside = lattice.weights @ values[coarse.faces]
+        return np.concatenate([values, *(x.reshape(-1, values.shape[1]) for x in (along, inside))])
 
-    splits = np.cumsum([x.shape[1] for x in columns])[:-1]
-    normals, *rest = np.split(linear, splits, axis=1)
-    uv = None if coarse.uv is None else rest.pop(0)
-    attributes = dict(zip(names, rest, strict=True))
-    attributes |= {name: np.repeat(x, n * n, axis=0) for name, x in coarse.attributes.items() if name not in names}
-    faces = _numbers(coarse, edges, lattice, n)[:, lattice.triangles].reshape(-1, 3)
-    return Surface(vertices, faces, normals=_unit(normals), uv=uv, attributes=attributes)
+    return Surface(
+        vertices,
+        faces=_numbers(coarse, edges, lattice, n)[:, lattice.triangles].reshape(-1, 3),
+        normals=_unit(linear(coarse.normals)),
+        uv=None if coarse.uv is None else linear(coarse.uv),
+        attributes={
+            name: linear(values) if name.startswith("vertex_") else np.repeat(values, n * n, axis=0)
+            for name, values in coarse.attributes.items()
+        },
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,29 +127,29 @@ class _Edges:
     first: Integers  # (c,) an edge of each curve
 
 
-def _places(mesh: Surface) -> Integers:
+def _positions(mesh: Surface) -> Integers:
     """A number (n,) for each vertex, the same for those that lie in one place."""
     return np.unique(mesh.vertices + 0.0, axis=0, return_inverse=True)[1].reshape(-1)  # -0.0 becomes 0.0
 
 
-def _without_empty(mesh: Surface, place: Integers) -> Surface:
+def _without_empty(mesh: Surface, at: Integers) -> Surface:
     """Without faces that have two corners in one place, as at the poles of a sphere: their patches would stick out."""
-    corners = place[mesh.faces]
+    corners = at[mesh.faces]
     whole = np.all(corners != np.roll(corners, 1, axis=1), axis=1)
     attributes = {name: x if name.startswith("vertex_") else x[whole] for name, x in mesh.attributes.items()}
     return replace(mesh, faces=mesh.faces[whole], attributes=attributes)
 
 
-def _edges(mesh: Surface, place: Integers) -> _Edges:
+def _edges(mesh: Surface, at: Integers) -> _Edges:
     count = len(mesh.vertices)
     rank = np.empty(count, np.int64)
-    rank[np.argsort(place, kind="stable")] = np.arange(count)
+    rank[np.argsort(at, kind="stable")] = np.arange(count)
     side = np.stack([mesh.faces, np.roll(mesh.faces, -1, axis=1)], axis=2)
     forward = rank[side[..., 0]] < rank[side[..., 1]]
     side = np.where(forward[..., None], side, side[..., ::-1]).reshape(-1, 2)
     _, one, of_side = np.unique(rank[side[:, 0]] * count + rank[side[:, 1]], return_index=True, return_inverse=True)
     ends = side[one]
-    _, first, curve = np.unique(place[ends[:, 0]] * count + place[ends[:, 1]], return_index=True, return_inverse=True)
+    _, first, curve = np.unique(at[ends[:, 0]] * count + at[ends[:, 1]], return_index=True, return_inverse=True)
     return _Edges(ends, of_side.reshape(-1, 3), forward, curve, first)
 
 
@@ -200,13 +203,13 @@ def _patches(mesh: Surface, edges: _Edges, curves: Reals) -> Reals:
 
 
 class _Lattice(NamedTuple):
-    """The points of a divided triangle: (l, 3) barycentric weights."""
+    """The l points of a divided triangle, i of them on no side."""
 
-    steps: Integers  # (l, 3) the weights times n
-    weights: Reals
-    inner: NDArray[np.bool_]  # (l,) those on no side
-    cubic: Reals  # (inner, 10) weights of the patch's control points
-    triangles: Integers  # (n², 3)
+    steps: Integers  # (l, 3) barycentric weights times n
+    inner: NDArray[np.bool_]  # (l,) whether on no side
+    weights: Reals  # (i, 3) of the corners
+    cubic: Reals  # (i, 10) of the patch's control points
+    triangles: Integers  # (n², 3) between the l points
 
 
 @cache
@@ -214,7 +217,8 @@ def _lattice(n: int) -> _Lattice:
     b, c = np.array([(b, c) for c in range(n + 1) for b in range(n + 1 - c)]).T
     steps = np.stack([n - b - c, b, c], axis=1)
     inner = np.all(steps > 0, axis=1)
-    u, v, w = (steps[inner] / n).T
+    weights = steps[inner] / n
+    u, v, w = weights.T
     sides = [3 * x for p, q in ((u, v), (v, w), (w, u)) for x in (p * p * q, p * q * q)]
     cubic = np.stack([u**3, v**3, w**3, *sides, 6 * u * v * w], axis=1)
 
@@ -226,7 +230,7 @@ def _lattice(n: int) -> _Lattice:
     up = [at(b + i, c + j)[upward] for i, j in ((0, 0), (1, 0), (0, 1))]
     down = [at(b + i, c + j)[downward] for i, j in ((1, 0), (1, 1), (0, 1))]
     triangles = np.concatenate([np.stack(up, axis=1), np.stack(down, axis=1)])
-    return _Lattice(steps, steps / n, inner, cubic, triangles)
+    return _Lattice(steps, inner, weights, cubic, triangles)
 
 
 def _numbers(mesh: Surface, edges: _Edges, lattice: _Lattice, n: int) -> Integers:
@@ -248,7 +252,8 @@ def _numbers(mesh: Surface, edges: _Edges, lattice: _Lattice, n: int) -> Integer
 
 
 def _bernstein(t: Reals) -> Reals:
-    return np.concatenate([(1 - t) ** 3, 3 * t * (1 - t) ** 2, 3 * t * t * (1 - t), t**3], axis=1)
+    """Weights (n, 4) of a cubic curve's control points at parameters t (n,)."""
+    return np.stack([(1 - t) ** 3, 3 * t * (1 - t) ** 2, 3 * t * t * (1 - t), t**3], axis=1)
 
 
 def _unit(normals: Reals) -> Reals:
