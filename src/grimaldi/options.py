@@ -66,6 +66,7 @@ def describe(scene: Scene, *, diffraction: str, interference: bool, options: Opt
     return {
         "scene": scene.name,
         "scene_unit": scene.unit or "",
+        "smooth": scene.smooth,
         "units": "lengths in scene units; U is the square root of irradiance",
         "time_convention": SIGNS,
         "diffraction": diffraction,

@@ -31,6 +31,7 @@ def field(
     weights: Literal["report", "length", "kernel"] = "report",
     epsilon: float | None = None,
     fast: bool = True,
+    smooth: int = 0,
     **unknown: Any,
 ) -> xr.Dataset:
     """The complex field of a scene's sources at points.
@@ -60,6 +61,7 @@ def field(
         fast: whether "boundary" may sum points on a plane behind holes or masks by one non-uniform FFT (Barnett,
             JATIS 7(2) 021211) where the bound of its error is within `tolerance` and it is expected to be faster.
             False: always along the outlines.
+        smooth: levels by which meshes with vertex normals are divided, as in `grimaldi.load`.
 
     Returns:
         Dataset with `U` complex128 (wavelength, group, point) by eq. 1-2 and 4-6, `intensity` float64 (point) by
@@ -86,7 +88,7 @@ def field(
     p = checked_points(points)
     options = checked_options(tolerance, precision, occlusion, n, weights, epsilon, rim, fast)
     factor = model(diffraction)
-    loaded = load(scene, scene_unit=scene_unit)
+    loaded = load(scene, scene_unit=scene_unit, smooth=smooth)
     wavelengths = parse_wavelengths(loaded.wavelength if wavelength is None else wavelength, loaded.unit)
     require_sources(loaded)
     sources = loaded.sources if interference else separated(loaded.sources)

@@ -41,6 +41,7 @@ def render(
     weights: Literal["report", "length", "kernel"] | None = None,
     epsilon: float | None = None,
     max_depth: int | None = None,
+    smooth: int = 0,
     **unknown: Any,
 ) -> xr.Dataset:
     """Render a scene with interference and diffraction.
@@ -51,8 +52,8 @@ def render(
 
     Args:
         scene: path, dict, `mi.Scene`, name of a built-in scene, or what `grimaldi.load` returned.
-        wavelength, scene_unit, diffraction, interference, tolerance, precision, occlusion, rim, n, weights, epsilon: as
-            in `grimaldi.field`.
+        wavelength, scene_unit, diffraction, interference, tolerance, precision, occlusion, rim, n, weights, epsilon,
+            smooth: as in `grimaldi.field`.
         spp: samples a pixel.
         seed: of the random numbers.
         size: (width, height) in pixels.
@@ -79,7 +80,7 @@ def render(
 
     check_options(unknown, signature(render).parameters)
     ensure_variant("rgb")
-    loaded = load(scene, scene_unit=scene_unit)
+    loaded = load(scene, scene_unit=scene_unit, smooth=smooth)
     require_sensor(loaded)
     require_sources(loaded)
     own = _integrator(loaded)

@@ -35,6 +35,7 @@ def field(
     weights: options.Weights = None,
     epsilon: options.Epsilon = None,
     fast: options.Fast = None,
+    smooth: options.Smooth = None,
     variant: options.Variant = None,
 ) -> None:
     """Compute the complex field of SCENE at points."""
@@ -58,6 +59,7 @@ def field(
         weights=weights,
         epsilon=epsilon,
         fast=fast,
+        smooth=smooth,
     )
     options.set_variant(variant)
 

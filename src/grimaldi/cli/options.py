@@ -62,6 +62,10 @@ Fast = Annotated[
         "--fast/--no-fast", help="Whether points on a plane behind holes may be summed by one FFT, within tolerance."
     ),
 ]
+Smooth = Annotated[
+    int | None,
+    typer.Option(help="Divide meshes with vertex normals into curved surfaces.  [default: 0]", metavar="LEVELS"),
+]
 Variant = Annotated[
     str | None, typer.Option(help="Mitsuba's variant, such as llvm_ad_rgb.  [default: the best that works]")
 ]

@@ -16,6 +16,7 @@ def outline(
     source: Annotated[
         str | None, typer.Option(help="Which source, by name; needed where the scene has several.")
     ] = None,
+    smooth: options.Smooth = None,
     variant: options.Variant = None,
 ) -> None:
     """Write the outlines and the shadow mask that a source sees."""
@@ -26,6 +27,6 @@ def outline(
     from grimaldi.outlines.write import write
     from grimaldi.scene.sources import pick_source
 
-    loaded = grimaldi.load(scene)
+    loaded = grimaldi.load(scene, **options.given(smooth=smooth))
     seen_from = pick_source(loaded, source)
     write(grimaldi.outline(loaded, seen_from), loaded, seen_from, output)

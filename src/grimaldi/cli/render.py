@@ -38,6 +38,7 @@ def render(
         Literal["picture", "phase", "phase-cyclic", "phase-intensity"],
         typer.Option(help="What a .png shows."),
     ] = "picture",
+    smooth: options.Smooth = None,
     variant: options.Variant = None,
 ) -> None:
     """Render SCENE with interference and diffraction."""
@@ -58,6 +59,7 @@ def render(
         n=options.number(n),
         weights=weights,
         epsilon=epsilon,
+        smooth=smooth,
         max_depth=max_depth,
         spp=spp,
         size=None if size is None else parse_size(size),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -30,6 +30,18 @@ class Shapes:
     others: tuple[str, ...]  # names of the shapes that do not diffract yet
 
 
+@dataclass(frozen=True, eq=False)
+class Surface(Mesh):
+    """A mesh with what its vertices carry: normals (n, 3), uv (n, 2), and Mitsuba's attributes.
+
+    Those named "vertex_…" have a row for each vertex, those named "face_…" one for each face.
+    """
+
+    normals: Reals
+    uv: Reals | None
+    attributes: dict[str, Reals]
+
+
 def sort_shapes(shapes: Iterable[Any]) -> Shapes:
     """Opaque bodies, holes (BSDF `aperture`), and the rest, of `mi.Scene.shapes()`.
 
@@ -46,7 +58,7 @@ def sort_shapes(shapes: Iterable[Any]) -> Shapes:
         name = shape.id() or f"{shape.class_name()} {index}"
         surface = _geometry(shape)
         surfaces.append(surface)
-        if getattr(shape.bsdf(), "plugin_name", None) == "aperture":
+        if is_aperture(shape):
             holes.append(planar_outline(shape, name))
         elif surface is not None and _is_opaque(shape):
             bodies.append(Body(name, index, surface))
@@ -61,17 +73,38 @@ def blockers(mi_scene: Any) -> Any:
     Only what has a null BSDF or part (apertures, masks, media) is left out. Embree's robust mode finds rays that
     meet an edge exactly, as those along an outline do.
     """
-    import mitsuba as mi
-
     opaque = [shape for shape in mi_scene.shapes() if not _lets_through(shape)]
     if not opaque:
         return None
-    names = [shape.id() for shape in opaque]
-    parts = {f"shape-{i}": shape for i, shape in enumerate(opaque)}
-    scene = mi.load_dict({"type": "scene", "embree_use_robust_intersections": True, **parts})
-    for shape, name in zip(opaque, names, strict=True):  # loading renames them by their keys
-        shape.set_id(name)
+    return _sharing(opaque, embree_use_robust_intersections=True)
+
+
+def with_shapes(mi_scene: Any, shapes: Sequence[Any]) -> Any:
+    """A Mitsuba scene of other shapes, in their order, that shares integrator, sensors and emitters with `mi_scene`."""
+    own = [part for part in (*mi_scene.sensors(), *mi_scene.emitters()) if part.get_shape() is None]
+    integrator = mi_scene.integrator()
+    return _sharing([*shapes, *own, *([] if integrator is None else [integrator])])
+
+
+def _sharing(parts: Sequence[Any], **flags: bool) -> Any:
+    """A Mitsuba scene of parts that other scenes have too."""
+    import mitsuba as mi
+
+    names = [part.id() for part in parts]
+    scene = mi.load_dict({"type": "scene", **flags, **{f"part-{i}": part for i, part in enumerate(parts)}})
+    for part, name in zip(parts, names, strict=True):  # loading renames them by their keys
+        part.set_id(name)
     return scene
+
+
+def is_aperture(shape: Any) -> bool:
+    """Whether a shape is a hole, by the BSDF `aperture`."""
+    return getattr(shape.bsdf(), "plugin_name", None) == "aperture"
+
+
+def carries_light(shape: Any) -> bool:
+    """Whether an emitter or a sensor sits on a shape."""
+    return shape.is_emitter() or shape.is_sensor()
 
 
 def _lets_through(shape: Any) -> bool:
@@ -135,9 +168,7 @@ def _is_opaque(shape: Any) -> bool:
 def _geometry(shape: Any) -> Geometry | None:
     kind = shape.class_name()
     if shape.is_mesh() and kind != "EllipsoidsMesh":
-        positions = np.array(shape.vertex_positions_buffer(), dtype=np.float64).reshape(-1, 3)
-        faces = np.array(shape.faces_buffer(), dtype=np.int64).reshape(-1, 3)
-        return Mesh(positions, faces)
+        return _mesh(shape)
     if kind not in ("Sphere", "Disk", "Cylinder"):
         return None
     to_world = _to_world(shape)
@@ -154,6 +185,35 @@ def _radius(shape: Any, to_world: Reals) -> float:
     scales = np.linalg.norm(to_world[:3, :3], axis=0)
     uniform = np.allclose(scales, by_area, rtol=FLAT, atol=0)
     return float(scales.mean()) if uniform else by_area  # the area is rounded once more
+
+
+def _mesh(shape: Any) -> Mesh:
+    faces = np.array(shape.faces_buffer(), dtype=np.int64).reshape(-1, 3)
+    return Mesh(_rows(shape.vertex_positions_buffer(), 3), faces)
+
+
+def surface(shape: Any) -> Surface | None:
+    """A mesh that is shaded by vertex normals; None of any other shape."""
+    import mitsuba as mi
+
+    mesh = shape.is_mesh() and not shape.is_ellipsoids()
+    if not mesh or not shape.has_vertex_normals() or shape.has_face_normals():
+        return None
+    plain = _mesh(shape)
+    uv = _rows(shape.vertex_texcoords_buffer(), 2) if shape.has_vertex_texcoords() else None
+    rows = {"vertex": len(plain.vertices), "face": len(plain.faces)}
+    attributes = {}
+    for name, _ in mi.traverse(shape):
+        kind = name.partition("_")[0]
+        if kind in rows and shape.has_attribute(name):
+            values = shape.attribute_buffer(name)
+            attributes[name] = _rows(values, len(values) // rows[kind])
+    normals = _rows(shape.vertex_normals_buffer(), 3)
+    return Surface(plain.vertices, plain.faces, normals, uv, attributes)
+
+
+def _rows(values: Any, columns: int) -> Reals:
+    return np.array(values, dtype=np.float64).reshape(-1, columns)
 
 
 def _to_world(shape: Any) -> Reals:

@@ -17,6 +17,7 @@ from grimaldi.scene.instances import write_out
 from grimaldi.scene.messages import one_line
 from grimaldi.scene.model import Scene
 from grimaldi.scene.planar import PlanarOutline
+from grimaldi.scene.smooth import check_levels, smooth_meshes
 from grimaldi.scene.sources import sources
 from grimaldi.scene.xml import DEEPEST, check_xml
 
@@ -27,18 +28,21 @@ def load(
     outlines: Iterable[PlanarOutline] = (),
     scene_unit: str | None = None,
     coherent: Collection[str] = (),
+    smooth: int = 0,
 ) -> Scene:
     """A checked scene: its opaque bodies, holes and sources in Float64, and the Mitsuba scene itself.
 
     Args:
         scene: path of a Mitsuba XML file or of a pbrt file (.pbrt, version 3 or 4); a Mitsuba scene dictionary;
-            a `mi.Scene`; the name of a built-in scene; or a `Scene`, which is returned as it is unless outlines or a
-            unit are given.
+            a `mi.Scene`; the name of a built-in scene; or a `Scene`, which is returned as it is unless outlines,
+            a unit or levels are given.
         outlines: planar outlines to add, holes of the aperture screen or opaque masks.
         scene_unit: length of one scene unit, such as "1 um". Otherwise that of the scene itself: in XML
             `<string name="scene_unit" value="1 um"/>` directly in `<scene>`, in a dictionary the key
             "scene_unit" beside "type".
         coherent: ids of Mitsuba's `point` and `directional` lights that join coherence group "0".
+        smooth: levels, 0 to 6, by which meshes with vertex normals are divided into the curved surfaces that these
+            stand for, each face into 4^smooth: for the camera, for rays, and for outlines.
 
     Where no Mitsuba variant is set, the best mono one that works is.
 
@@ -49,10 +53,11 @@ def load(
     Warns:
         GrimaldiWarning: naming what does not diffract yet, and edges shared by more than two faces.
     """
+    check_levels(smooth)
     added = _outlines(outlines)
     if isinstance(scene, Scene):
         loaded = replace(scene, sources=sources(scene.mitsuba, coherent=coherent)) if coherent else scene
-        if not added and scene_unit is None:
+        if not added and scene_unit is None and smooth == 0:
             return loaded
     else:
         loaded = _read(scene, coherent)
@@ -63,8 +68,18 @@ def load(
         unit=loaded.unit if scene_unit is None else scene_unit,
     )
     with _in_scene(loaded.name):
+        loaded = _smoothed(loaded, smooth)
         check_scene(loaded)
     return loaded
+
+
+def _smoothed(scene: Scene, levels: int) -> Scene:
+    """The scene with its bodies divided; sources and holes keep the shapes that they name."""
+    finer = smooth_meshes(scene.mitsuba, levels)
+    if finer is scene.mitsuba:
+        return scene
+    bodies = sort_shapes(finer.shapes()).bodies
+    return replace(scene, mitsuba=finer, blockers=blockers(finer), bodies=bodies, smooth=scene.smooth + levels)
 
 
 def _outlines(outlines: Iterable[PlanarOutline]) -> tuple[PlanarOutline, ...]:

@@ -111,6 +111,7 @@ class Scene:
     masks: tuple[PlanarOutline, ...] = ()
     unit: str | None = None  # length of one scene unit, as text for pint: "1 um"
     wavelength: Any = None  # of the scene's own `wave` integrator, as it was written there
+    smooth: int = 0  # levels by which meshes with vertex normals are divided
 
     @property
     def screen(self) -> tuple[PlanarOutline, ...]:
