@@ -17,6 +17,7 @@ from grimaldi.scene.planar import PlanarOutline
 
 LONGEST = 1 / 32  # of the outlines' extent: how finely X→P visibility is told along a straight edge
 DEFAULT_SAG = 1e-4  # of a curve's size, where no wavelength sets it
+BESIDE = 1e-6  # of the coordinates: how far Float32 vertices of a wall may lie beside it
 
 
 def outline(scene: Scene, source: Source, *, sag: Sequence[float] | None = None) -> Outline:
@@ -72,9 +73,11 @@ def _silhouette(body: Body, source: Source, sag: float) -> Candidates:
 def gap_behind(
     standing: tuple[Obstacle, ...], source: Source, edges: Candidates, body: Integers, lit: Stretches
 ) -> Reals:
-    """For each lit stretch, how far behind its middle its own body comes next."""
+    """For each lit stretch, how far behind its middle its own body comes next; a wall along the ray does not."""
     c, at = lit.candidate, 0.5 * (lit.low + lit.high)
-    x = edges.start[c] + at[:, None] * (edges.end[c] - edges.start[c])
+    span = edges.end[c] - edges.start[c]
+    x = edges.start[c] + at[:, None] * span
+    x += BESIDE * np.abs(x).max(initial=0.0) * _outward(source, x, span)
     result = np.full(len(c), np.inf)
     for number, of in enumerate(standing):
         own = body[c] == number
@@ -105,12 +108,15 @@ def assemble(edges: Candidates, body: Integers, lit: Stretches, behind: Reals, s
     order, chain = _chains(start, end)
     start, end, c = start[order], end[order], c[order]
     interval = np.stack([lit.low, lit.high], axis=1)[some][order]
-    ray = -toward(source, 0.5 * (start + end))
-    out = np.cross(end - start, ray)
-    size = np.linalg.norm(out, axis=1, keepdims=True)
-    hole = (body[c] < 0)[:, None]  # a hole's open side is the one its loop encloses
-    outward = np.where(hole, -out, out) / np.maximum(size, 1e-300)
+    out = _outward(source, 0.5 * (start + end), end - start)
+    outward = np.where((body[c] < 0)[:, None], -out, out)  # a hole's open side is the one its loop encloses
     return Outline(start, end, body[c], edges.edge[c], interval, edges.normals[c], outward, behind[order], chain, sag)
+
+
+def _outward(source: Source, x: Reals, span: Reals) -> Reals:
+    """Unit vectors (n, 3) across the rays at x, to the right of edges that run along `span` (n, 3)."""
+    out = np.cross(span, -toward(source, x))
+    return out / np.maximum(np.linalg.norm(out, axis=1, keepdims=True), 1e-300)
 
 
 def _chains(start: Reals, end: Reals) -> tuple[Integers, Integers]:

@@ -2,7 +2,7 @@
 
 An edge bounds the light exactly where all its triangles lie on one side of it in the source's view: so borders of
 open meshes count, edges between coplanar faces do not, and neither winding nor the number of triangles at an edge
-matters. Each triangle's side is decided once, by one determinant: the edges of a closed mesh form closed loops.
+matters. Each triangle's side is decided once: the edges of a closed mesh form closed loops.
 """
 
 from __future__ import annotations
@@ -10,9 +10,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from grimaldi.outlines.candidate import Candidates, facing
+from grimaldi.outlines.candidate import Candidates, facing, toward
 from grimaldi.outlines.model import Integers, Reals
 from grimaldi.scene.model import Mesh, Source
+
+EDGE_ON = 1e-6  # rad: what Float32 vertices leave open of a face's direction
 
 
 def weld(mesh: Mesh) -> tuple[Reals, Integers]:
@@ -29,14 +31,18 @@ def has_corners(faces: Integers) -> NDArray[np.bool_]:
 
 
 def sides(source: Source, corners: Reals) -> Integers:
-    """±1: whether triangles (m, 3, 3) turn counter-clockwise along the rays of the source; edge-on ones count as +1."""
-    if source.position is not None:
-        a, b, c = np.moveaxis(corners - source.position, 1, 0)
-        turn = np.einsum("ij,ij->i", np.cross(a, b), c)
-    else:
-        a, b, c = np.moveaxis(corners, 1, 0)
-        turn = np.cross(b - a, c - a) @ source.direction
-    return np.where(turn < 0, -1, 1)
+    """±1: whether triangles (m, 3, 3) turn counter-clockwise along the rays of the source.
+
+    Edge-on ones turn as they would for the source a little nearer to their common middle: winding does not matter,
+    and a box in light along its walls is bounded by the border of its front.
+    """
+    a, b, c = np.moveaxis(corners, 1, 0)
+    area = np.cross(b - a, c - a)
+    ray = -toward(source, a)
+    turn = np.einsum("ij,ij->i", area, ray)
+    level = EDGE_ON * np.linalg.norm(area, axis=1) * np.linalg.norm(ray, axis=1)
+    nearer = np.einsum("ij,ij->i", area, a - corners.mean(axis=(0, 1)))
+    return np.where(np.where(np.abs(turn) > level, turn, nearer) < 0, -1, 1)
 
 
 def silhouette(mesh: Mesh, source: Source) -> Candidates:
@@ -81,10 +87,21 @@ def normals_beside(
     unit = area / np.maximum(np.linalg.norm(area, axis=1, keepdims=True), 1e-300)
     n1, n2 = facing(source, unit[face1], x), facing(source, unit[face2], x)
     two = face2 >= 0
+    out1, out2 = _furthest(n2, corners[face1] - x[:, None]), _furthest(n1, corners[face2] - x[:, None])
+    ray = toward(source, x)
+    level = EDGE_ON * np.linalg.norm(ray, axis=1)
+    level1, level2 = (np.einsum("ij,ij->i", n, ray) <= level for n in (n1, n2))
     # face2 is in front where it bulges out of the plane of face1 towards the source
-    bulge = np.einsum("ij,ikj->ik", n1, corners[face2] - x[:, None])
-    furthest = np.take_along_axis(bulge, np.abs(bulge).argmax(axis=1)[:, None], axis=1)[:, 0]
-    swap = two & (furthest > 0)
+    swap = two & np.where(level1, out1 < 0, out2 > 0)
+    # an edge-on face's normal points away from the other face
+    n1 = np.where((two & level1 & ((out2 > 0) != swap))[:, None], -n1, n1)
+    n2 = np.where((two & level2 & ((out1 > 0) == swap))[:, None], -n2, n2)
     lit = np.where(swap[:, None], n2, n1)
     dark = np.where(two[:, None], -np.where(swap[:, None], n1, n2), 0.0)
     return np.stack([lit, dark], axis=1), swap
+
+
+def _furthest(normals: Reals, corners: Reals) -> Reals:
+    """Of corners (n, 3, 3) the height (n,) along normals that is the furthest from 0."""
+    height = np.einsum("ij,ikj->ik", normals, corners)
+    return np.take_along_axis(height, np.abs(height).argmax(axis=1)[:, None], axis=1)[:, 0]
