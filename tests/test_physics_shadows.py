@@ -113,6 +113,17 @@ def test_a_box_in_light_along_its_walls_is_its_front_face(light):
     np.testing.assert_allclose(computed, factor(light, BEHIND, outlines=[front], tolerance=1e-5), rtol=0, atol=1e-4)
 
 
+@pytest.mark.parametrize("light", [PLANE, LAMP], ids=["plane", "point"])
+@pytest.mark.parametrize("kind", ["rectangle", "disk"])
+def test_a_sheet_in_the_plane_of_the_rays_stops_none(kind, light):
+    """A sheet seen edge-on has no lit surface: M = 1."""
+    upright = [[1, 0, 0], [0, 0, -1], [0, 1, 0]]
+    points = np.concatenate([BEHIND, [[0, 4, 30], [1, 2, 60]]])
+    for mirror in (1, -1):
+        sheet = shape(kind, affine((6, 5, mirror), turn=upright))
+        np.testing.assert_allclose(factor(light, points, sheet), 1, rtol=0, atol=1e-12)
+
+
 def test_the_lit_side_of_a_sphere_is_undisturbed():
     polar, azimuth = np.meshgrid(np.radians([0, 5, 20, 40, 60, 75]), np.arange(0, 6, 0.7))
     polar, azimuth = polar.ravel(), azimuth.ravel()

@@ -10,11 +10,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from grimaldi.outlines.candidate import Candidates, facing, toward
+from grimaldi.outlines.candidate import Candidates, edge_on, facing, toward
 from grimaldi.outlines.model import Integers, Reals
 from grimaldi.scene.model import Mesh, Source
-
-EDGE_ON = 1e-6  # rad: what Float32 vertices leave open of a face's direction
 
 
 def weld(mesh: Mesh) -> tuple[Reals, Integers]:
@@ -36,13 +34,16 @@ def sides(source: Source, corners: Reals) -> Integers:
     Edge-on ones turn as they would for the source a little nearer to their common middle: winding does not matter,
     and a box in light along its walls is bounded by the border of its front.
     """
-    a, b, c = np.moveaxis(corners, 1, 0)
-    area = np.cross(b - a, c - a)
-    ray = -toward(source, a)
-    turn = np.einsum("ij,ij->i", area, ray)
-    level = EDGE_ON * np.linalg.norm(area, axis=1) * np.linalg.norm(ray, axis=1)
+    a, area = corners[:, 0], areas(corners)
+    turn = -np.einsum("ij,ij->i", area, toward(source, a))
     nearer = np.einsum("ij,ij->i", area, a - corners.mean(axis=(0, 1)))
-    return np.where(np.where(np.abs(turn) > level, turn, nearer) < 0, -1, 1)
+    return np.where(np.where(edge_on(source, area, a), nearer, turn) < 0, -1, 1)
+
+
+def areas(corners: Reals) -> Reals:
+    """Twice the area vectors (m, 3) of triangles (m, 3, 3)."""
+    a, b, c = np.moveaxis(corners, 1, 0)
+    return np.cross(b - a, c - a)
 
 
 def silhouette(mesh: Mesh, source: Source) -> Candidates:
@@ -54,7 +55,10 @@ def silhouette(mesh: Mesh, source: Source) -> Candidates:
     points, faces = weld(mesh)
     whole = has_corners(faces)
     index, faces = np.flatnonzero(whole), faces[whole]
-    side = sides(source, points[faces])
+    corners = points[faces]
+    if edge_on(source, areas(corners), corners[:, 0]).all():  # a sheet in the plane of its rays stops none
+        return Candidates.empty()
+    side = sides(source, corners)
 
     tail, head = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
     forward = tail < head
@@ -83,18 +87,17 @@ def normals_beside(
 ) -> tuple[Reals, np.ndarray]:
     """Normals (n, 2, 3) beside edges at x, the face towards the source first, and where face2 is that one."""
     corners = points[faces]
-    area = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    area = areas(corners)
     unit = area / np.maximum(np.linalg.norm(area, axis=1, keepdims=True), 1e-300)
     n1, n2 = facing(source, unit[face1], x), facing(source, unit[face2], x)
     two = face2 >= 0
     out1, out2 = _furthest(n2, corners[face1] - x[:, None]), _furthest(n1, corners[face2] - x[:, None])
-    ray = toward(source, x)
-    level = EDGE_ON * np.linalg.norm(ray, axis=1)
-    level1, level2 = (np.einsum("ij,ij->i", n, ray) <= level for n in (n1, n2))
+    level1, level2 = edge_on(source, n1, x), edge_on(source, n2, x)
     # face2 is in front where it bulges out of the plane of face1 towards the source
     swap = two & np.where(level1, out1 < 0, out2 > 0)
-    # an edge-on face's normal points away from the other face
-    n1 = np.where((two & level1 & ((out2 > 0) != swap))[:, None], -n1, n1)
+    # an edge-on face's normal points away from the other face, a lone one's from the middle of the mesh
+    inward = np.where(two, (out2 > 0) != swap, np.einsum("ij,ij->i", n1, x - points.mean(axis=0)) < 0)
+    n1 = np.where((level1 & inward)[:, None], -n1, n1)
     n2 = np.where((two & level2 & ((out1 > 0) == swap))[:, None], -n2, n2)
     lit = np.where(swap[:, None], n2, n1)
     dark = np.where(two[:, None], -np.where(swap[:, None], n1, n2), 0.0)
