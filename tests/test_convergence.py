@@ -69,10 +69,16 @@ def test_meshed_spheres_converge_to_the_sphere(tmp_path, kind, turned):
 
 
 def test_meshed_tubes_converge_to_the_cylinder(tmp_path):
-    """|M_mesh - M| = O(h²), h the width of a face; what hides its rims from the receivers is left out."""
+    """|M_mesh - M| = O(h²), h the width of a face; what hides parts of the rims adds steps, and is left out."""
     exact = factor(LIGHT, POINTS, shape("cylinder", affine(1), **TUBE), tolerance=1e-6, occlusion=False)
     found = errors(tmp_path / "tube.obj", [tube(n) for n in range(1, 5)], exact, occlusion=False)
     assert order(0.5 ** np.arange(1, 5), found) == pytest.approx(2, abs=0.25)
+
+
+def test_a_finely_meshed_tube_hides_the_same_as_the_cylinder(tmp_path):
+    """X→P along a wall is told as finely for the cylinder, 150 radii away, as for its faces."""
+    exact = factor(LIGHT, POINTS, shape("cylinder", affine(1), **TUBE), tolerance=1e-5)
+    assert errors(tmp_path / "tube.obj", [tube(6)], exact)[0] < 2e-3
 
 
 def test_meshed_tori_converge_to_the_finest(tmp_path):

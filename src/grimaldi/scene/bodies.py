@@ -12,9 +12,11 @@ from numpy.typing import NDArray
 from grimaldi.errors import InputError
 from grimaldi.scene.model import Body, Cylinder, Disk, Geometry, Mesh, Sphere
 from grimaldi.scene.planar import PlanarOutline
+from grimaldi.scene.triangles import as_mesh
 
 Reals = NDArray[np.float64]
 
+FACES_ROUND = 4096  # of a cylinder: they lie 3e-7 radii inside it
 FLAT = 1e-6  # thickness over extent below which vertices lie in one plane: a few roundings of Float32
 
 _SQUARE = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
@@ -55,7 +57,8 @@ def blockers(mi_scene: Any) -> Any:
     """A Mitsuba scene that shares all shapes that stop light, also those that do not diffract; None without any.
 
     Only what has a null BSDF or part (apertures, masks, media) is left out. Embree's robust mode finds rays that
-    meet an edge exactly, as those along an outline do.
+    meet an edge exactly, as those along an outline do. Of cylinders it holds the faces: Mitsuba's own intersection
+    solves a quadratic in Float32, which from 150 radii away misses a cylinder's wall by a twentieth of its radius.
     """
     import mitsuba as mi
 
@@ -63,11 +66,31 @@ def blockers(mi_scene: Any) -> Any:
     if not opaque:
         return None
     names = [shape.id() for shape in opaque]
-    parts = {f"shape-{i}": shape for i, shape in enumerate(opaque)}
+    parts = {f"shape-{i}": _faces(shape) for i, shape in enumerate(opaque)}
     scene = mi.load_dict({"type": "scene", "embree_use_robust_intersections": True, **parts})
     for shape, name in zip(opaque, names, strict=True):  # loading renames them by their keys
         shape.set_id(name)
     return scene
+
+
+def _faces(shape: Any) -> Any:
+    """A cylinder's faces; any other shape itself."""
+    import mitsuba as mi
+
+    if shape.class_name() != "Cylinder":
+        return shape
+    angle = 2 * np.pi * np.arange(FACES_ROUND) / FACES_ROUND
+    wall = tube(Cylinder(_to_world(shape)), np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1))
+    return as_mesh(mi, shape.id(), wall.vertices, wall.faces, mi.Properties())
+
+
+def tube(cylinder: Cylinder, ring: Reals) -> Mesh:
+    """A cylinder's wall as flat faces between points (n, 3) of its unit circle."""
+    n = len(ring)
+    local = np.concatenate([ring, ring + [0, 0, 1]])
+    here, there = np.arange(n), (np.arange(n) + 1) % n
+    faces = np.concatenate([np.stack([here, there, n + there], axis=1), np.stack([here, n + there, n + here], axis=1)])
+    return Mesh(local @ cylinder.to_world[:3, :3].T + cylinder.to_world[:3, 3], faces)
 
 
 def _lets_through(shape: Any) -> bool:
