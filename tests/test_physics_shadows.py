@@ -113,6 +113,19 @@ def test_a_box_in_light_along_its_walls_is_its_front_face(light):
     np.testing.assert_allclose(computed, factor(light, BEHIND, outlines=[front], tolerance=1e-5), rtol=0, atol=1e-4)
 
 
+@pytest.mark.parametrize("side", [-1, 1])
+def test_light_that_turns_past_a_wall_moves_its_border_to_the_back(side):
+    """The outline has depth: of a wall lit by 1e-5 rad the far border counts, and M is another."""
+    light = oracle.Plane((side * 1e-5, 0, 1))
+    back = np.array([[9, -4, 2], [9, -4, -2], [-9, -4, -2], [-9, 4, -2], [9, 4, -2], [9, 4, 2]]) * [-side, 1, 1]
+    expected = 1 - oracle.edge_factor(light, BEHIND, oracle.polygon_edge(back), 1)
+    computed, front = (
+        factor(beam, BEHIND, shape("cube", affine((9, 4, 2))), tolerance=1e-5) for beam in (light, PLANE)
+    )
+    np.testing.assert_allclose(computed, expected, rtol=0, atol=1e-4)
+    assert 0.1 < abs(computed - front).max() < 0.2
+
+
 @pytest.mark.parametrize("light", [PLANE, LAMP], ids=["plane", "point"])
 @pytest.mark.parametrize("kind", ["rectangle", "disk"])
 def test_a_sheet_in_the_plane_of_the_rays_stops_none(kind, light):
