@@ -104,31 +104,6 @@ def test_rectangle_by_fresnel_integrals(z1):
     np.testing.assert_allclose(computed, rectangle.factor(200, 120, x, y, z2, 1, z1), rtol=0, atol=1.2e-4)
 
 
-@pytest.mark.parametrize("light", LIGHTS)
-def test_babinet(light):
-    tolerance = 1e-5
-    hole, mask = (
-        factor(
-            LIGHTS[light],
-            ACROSS,
-            outlines=[grimaldi.PlanarOutline(CONCAVE, affine(1), hole=hole)],
-            tolerance=tolerance,
-        )
-        for hole in (True, False)
-    )
-    assert abs(hole).max() > 0.5
-    np.testing.assert_allclose(hole + mask, 1, rtol=0, atol=2 * tolerance)
-
-
-def test_two_holes_pass_the_sum_of_each():
-    tolerance = 1e-5
-    slits = [shape("rectangle", slit, APERTURE) for slit in SLITS]
-    both = factor(LAMP, ACROSS, *slits, tolerance=tolerance)
-    apart = [factor(LAMP, ACROSS, slit, tolerance=tolerance) for slit in slits]
-    assert min(abs(m).max() for m in apart) > 0.1
-    np.testing.assert_allclose(both, apart[0] + apart[1], rtol=0, atol=3 * tolerance)
-
-
 @pytest.mark.parametrize("hole", HOLES)
 def test_nothing_changes_on_the_side_of_the_source(hole):
     shapes, outlines, _ = HOLES[hole]

@@ -73,7 +73,7 @@ def warn_of_faint_light(U: NDArray[np.complex128], free: Reals, tolerance: float
     if not faint.size or faint.mean() <= 0.5:
         return
     typical = float(np.median(size[faint] / light[faint]))
-    finer = 10.0 ** np.floor(np.log10(max(min(typical, tolerance) * 1e-2, 1e-12)))
+    finer = max(10.0 ** np.floor(np.log10(1e-2 * max(typical, 1e-2 * tolerance))), 1e-12)
     warnings.warn(
         f"the light is below {FEW * tolerance:g} of what it is without obstacles at {faint.sum()} of {faint.size} "
         f"points, where tolerance={tolerance:g} leaves few digits; ask for tolerance={finer:g}",

@@ -10,6 +10,7 @@ import drjit as dr
 import numpy as np
 
 from grimaldi.diffraction.boundary import boundary
+from grimaldi.diffraction.curves import phase_allowed
 from grimaldi.diffraction.frame import incident
 from grimaldi.diffraction.fresnel_plane import fresnel_plane, planes
 from grimaldi.diffraction.model import Evaluate, Model, Options, Receivers
@@ -39,7 +40,7 @@ def propagate(
     pure and can be traced inside a larger kernel.
     """
     scene = scene.before(source)
-    sags, detour = _sags(scene, source, options.tolerance / k, where)
+    sags, detour = _sags(scene, source, phase_allowed(scene, options.tolerance) / k, where)
     seen = replace(outline(scene, source, sag=sags), detour=detour)
     return _wave(source, k, model(scene, source, seen, k, options))
 
@@ -108,4 +109,4 @@ def _sags(scene: Scene, source: Source, path: float, where: Reals) -> tuple[list
         sags.append(min(path / max(slope, 1e-3), 0.01 * radius))
         if is_curved(shape):
             detour = max(detour, slope * max(sags[-1], least_sag(radius)))
-    return sags, detour
+    return sags, float(detour)

@@ -9,10 +9,12 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import drjit as dr
+import mitsuba
 import numpy as np
 
 from grimaldi.diffraction import none
 from grimaldi.diffraction.arrays import Types, types
+from grimaldi.diffraction.curves import curve_error
 from grimaldi.diffraction.edges import Margins, Sum, body_sum, lit_share, planar_sum
 from grimaldi.diffraction.frame import Frame, frame
 from grimaldi.diffraction.grazing import chords, near
@@ -20,10 +22,12 @@ from grimaldi.diffraction.model import Evaluate, Factor, Options, Receivers
 from grimaldi.diffraction.occlusion import rays
 from grimaldi.diffraction.screen import beyond
 from grimaldi.diffraction.segment import Rule
-from grimaldi.diffraction.table import CURVE, Table, needs_double, table
+from grimaldi.diffraction.table import Table, needs_double, table
 from grimaldi.outlines.model import Outline
 from grimaldi.outlines.silhouettes import loops, same_loop, silhouettes
 from grimaldi.scene.model import Scene, Source
+
+mi: Any = mitsuba  # the stubs refuse numbers where arrays are asked for
 
 HIDDEN_END = 0.02  # of the tolerance: what an untested X→P may at most leave behind
 
@@ -40,7 +44,7 @@ class Problem(NamedTuple):
     def rule(self) -> Rule:
         """For segments, with what the polygons of curves leave as part of its share."""
         rule = Rule.of(self.options.tolerance)
-        return rule._replace(share=rule.share + CURVE * self.k * self.outline.detour)
+        return rule._replace(share=rule.share + curve_error(self.scene, self.outline, self.k))
 
 
 def boundary(scene: Scene, source: Source, outline: Outline, k: float, options: Options) -> Evaluate:
@@ -51,9 +55,11 @@ def boundary(scene: Scene, source: Source, outline: Outline, k: float, options: 
 
     Raises InputError in variants without vectorised arrays.
     """
-    if len(outline) == 0:
-        return none.none(scene, source, outline, k, options)
     problem = Problem(scene, source, outline, k, options)
+    if len(outline) == 0:
+        if scene.screen or scene.blockers is None:
+            return none.none(scene, source, outline, k, options)
+        return _rays_alone(problem)
     of_kind = _planar if scene.screen else _bodies
     double = of_kind(problem, types(double=True))
     if needs_double(outline, k, options):
@@ -114,6 +120,19 @@ def _planar(problem: Problem, precision: Types) -> Evaluate:
         geometric, sign = (n, -1) if screen.hole else (1 - n, 1)
         m = _factor(tab, rule, fr, k, margins, geometric, sign, sums)
         return Factor(dr.select(shaded, m.real, 1), dr.select(shaded, m.imag, 0), dr.select(shaded, m.error, 0))
+
+    return evaluate
+
+
+def _rays_alone(problem: Problem) -> Evaluate:
+    """Bodies without an outline, such as an empty room: the same shadow rays, which serve in its corners too."""
+    probe = rays(problem.scene, problem.source)
+
+    def evaluate(receivers: Receivers) -> Factor:
+        p = mi.Point3f(receivers.p)
+        lit = probe.lit(p + probe.epsilon(p) * receivers.n, receivers.active)
+        zero = types(double=False).Float(0)
+        return Factor(dr.select(lit, 1.0, zero), zero, zero)
 
     return evaluate
 

@@ -20,13 +20,14 @@ import numpy as np
 
 from grimaldi.diffraction import none
 from grimaldi.diffraction.arrays import types
+from grimaldi.diffraction.curves import curve_error
 from grimaldi.diffraction.edges import Nearest, closest, lit_share, planar_count, sounds
 from grimaldi.diffraction.frame import Frame, constant, frame
 from grimaldi.diffraction.model import NYQUIST, Evaluate, Factor, Options, Receivers
 from grimaldi.diffraction.occlusion import Rays, rays
 from grimaldi.diffraction.screen import beyond
 from grimaldi.diffraction.segment import Line, detour, line, sincos
-from grimaldi.diffraction.table import CURVE, Segment, Table, needs_double, table
+from grimaldi.diffraction.table import Segment, Table, needs_double, table
 from grimaldi.errors import InputError
 from grimaldi.outlines.divided import divided, joined
 from grimaldi.outlines.model import Integers, Outline, Reals
@@ -84,7 +85,7 @@ def huygens(scene: Scene, source: Source, outline: Outline, k: float, options: O
         lengths = _shared(lengths, sources.body)
     lamps = Lamps(tab, tab.types.Float(lengths), _kernel if options.weights == "kernel" else _forward)
     rounding = 2e-15 if dr.itemsize_v(tab.types.Float) == 8 else 5e-7
-    floor = rounding + CURVE * k * outline.detour
+    floor = rounding + curve_error(scene, outline, k)
     if scene.screen:
         return _planar(scene, source, lamps, k, floor, geometric)
     return _bodies(scene, source, lamps, sources.sag, k, floor, options.occlusion != "none", geometric)

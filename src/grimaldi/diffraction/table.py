@@ -14,7 +14,6 @@ from grimaldi.outlines.model import Outline
 from grimaldi.scene.model import Source, Vector
 
 LONGEST_PIECE = 8  # segments
-CURVE = 0.04  # of the phase that a curve's polygon errs by: what it leaves in M, inside and outside in turn
 
 
 class Segment(NamedTuple):

@@ -6,11 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields
 
 import numpy as np
+from numpy.typing import NDArray
 
 from grimaldi.outlines.model import Integers, Reals
 from grimaldi.scene.model import Source
 
 FINEST = 65536  # segments of a curve
+EDGE_ON = 1e-6  # rad: what Float32 vertices leave open of a face's direction
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,6 +48,13 @@ def facing(source: Source, normals: Reals, x: Reals) -> Reals:
     """Normals (n, 3) at x turned towards the source."""
     away = np.einsum("ij,ij->i", normals, toward(source, x)) < 0
     return np.where(away[:, None], -normals, normals)
+
+
+def edge_on(source: Source, normals: Reals, x: Reals) -> NDArray[np.bool_]:
+    """Whether faces with normals (n, 3) at x hold their rays from the source, as far as Float32 tells."""
+    w = toward(source, x)
+    along = np.einsum("ij,ij->i", normals, w)
+    return np.abs(along) <= EDGE_ON * np.linalg.norm(normals, axis=1) * np.linalg.norm(w, axis=1)
 
 
 def closed_curve(points: Reals, normals: Reals) -> Candidates:

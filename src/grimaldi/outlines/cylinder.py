@@ -6,6 +6,7 @@ import numpy as np
 
 from grimaldi.outlines.candidate import Candidates, facing, segments_for, toward
 from grimaldi.outlines.model import Reals
+from grimaldi.scene.bodies import tube
 from grimaldi.scene.model import Cylinder, Mesh, Source
 
 ALONG = 1e-12  # sine of the angle below which light runs along the axis
@@ -45,12 +46,7 @@ def silhouette(cylinder: Cylinder, source: Source, sag: float) -> Candidates:
 
 def strip(cylinder: Cylinder, source: Source, sag: float) -> Mesh:
     """The tube as flat faces within `sag` of it, with edges where the source's rays touch it."""
-    ring = _ring(_angles(cylinder, source, sag))
-    n = len(ring)
-    local = np.concatenate([ring, ring + [0, 0, 1]])
-    here, there = np.arange(n), (np.arange(n) + 1) % n
-    faces = np.concatenate([np.stack([here, there, n + there], axis=1), np.stack([here, n + there, n + here], axis=1)])
-    return Mesh(local @ cylinder.to_world[:3, :3].T + cylinder.to_world[:3, 3], faces)
+    return tube(cylinder, _ring(_angles(cylinder, source, sag)))
 
 
 def _ring(angle: Reals) -> Reals:

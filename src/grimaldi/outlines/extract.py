@@ -8,7 +8,7 @@ import numpy as np
 
 from grimaldi.outlines import curvature, cylinder, disk, mesh, planar, sphere
 from grimaldi.outlines.candidate import Candidates, toward
-from grimaldi.outlines.hidden import Obstacle, Queries, Triangles, behind, obstacles
+from grimaldi.outlines.hidden import Obstacle, Queries, behind, obstacles
 from grimaldi.outlines.lit import Stretches, lit_parts
 from grimaldi.outlines.model import Integers, Outline, Reals
 from grimaldi.scene.bodies import vertices
@@ -16,8 +16,8 @@ from grimaldi.scene.model import Body, Cylinder, Geometry, Mesh, Scene, Source, 
 from grimaldi.scene.planar import PlanarOutline
 
 LONGEST = 1 / 32  # of the outlines' extent: how finely X→P visibility is told along a straight edge
-HAIR = 1e-10  # of the coordinates
 DEFAULT_SAG = 1e-4  # of a curve's size, where no wavelength sets it
+BESIDE = 1e-6  # of the coordinates: how far Float32 vertices of a wall may lie beside it
 
 
 def outline(scene: Scene, source: Source, *, sag: Sequence[float] | None = None) -> Outline:
@@ -93,19 +93,15 @@ def _silhouette(body: Body, source: Source, sag: float) -> Candidates:
 def gap_behind(
     standing: tuple[Obstacle, ...], source: Source, edges: Candidates, body: Integers, lit: Stretches
 ) -> Reals:
-    """For each lit stretch, how far behind its middle its own body comes next.
-
-    Of a mesh from a hair beside the edge, on its open side: where faces lie along the light the ray through the edge
-    itself runs within them and meets their neighbours at corners.
-    """
+    """For each lit stretch, how far behind its middle its own body comes next; a wall along the ray does not."""
     c, at = lit.candidate, 0.5 * (lit.low + lit.high)
-    x = edges.start[c] + at[:, None] * (edges.end[c] - edges.start[c])
-    beside = HAIR * np.abs(x).max(initial=0.0) * _outward(edges.start[c], edges.end[c], source)
+    span = edges.end[c] - edges.start[c]
+    x = edges.start[c] + at[:, None] * span
+    x += BESIDE * np.abs(x).max(initial=0.0) * _outward(source, x, span)
     result = np.full(len(c), np.inf)
     for number, of in enumerate(standing):
         own = body[c] == number
-        places = x + beside if isinstance(of, Triangles) else x
-        result[own] = behind(of, source, Queries(places, body[c], edges.faces[c])[own])
+        result[own] = behind(of, source, Queries(x, body[c], edges.faces[c])[own])
     return result
 
 
@@ -140,17 +136,17 @@ def assemble(
     order, chain = _chains(start, end)
     start, end, c = start[order], end[order], c[order]
     interval = np.stack([lit.low, lit.high], axis=1)[some][order]
-    hole = (body[c] < 0)[:, None]  # a hole's open side is the one its loop encloses
-    outward = np.where(hole, -1, 1) * _outward(start, end, source)
+    out = _outward(source, 0.5 * (start + end), end - start)
+    outward = np.where((body[c] < 0)[:, None], -out, out)  # a hole's open side is the one its loop encloses
     radius = np.zeros(len(c)) if radius is None else radius[c]
     return Outline(
         start, end, body[c], edges.edge[c], interval, edges.normals[c], outward, behind[order], chain, radius, sag
     )
 
 
-def _outward(start: Reals, end: Reals, source: Source) -> Reals:
-    """Unit vectors (n, 3) across edges and the light, away from the side on their left."""
-    out = np.cross(end - start, -toward(source, 0.5 * (start + end)))
+def _outward(source: Source, x: Reals, span: Reals) -> Reals:
+    """Unit vectors (n, 3) across the rays at x, to the right of edges that run along `span` (n, 3)."""
+    out = np.cross(span, -toward(source, x))
     return out / np.maximum(np.linalg.norm(out, axis=1, keepdims=True), 1e-300)
 
 

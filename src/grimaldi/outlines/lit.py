@@ -86,8 +86,7 @@ def _crossings(source: Source, edges: Candidates) -> tuple[Integers, Reals]:
     i, j = np.concatenate([i, j]), np.concatenate([j, i])  # a wide edge finds the narrow ones, not they it
     shared = (edges.start[i] == edges.end[j]).all(1) | (edges.end[i] == edges.start[j]).all(1)
     keep = (i != j) & ~shared
-    pairs = np.unique(np.stack([i[keep], j[keep]], axis=1), axis=0)
-    i, j = pairs[:, 0], pairs[:, 1]
+    i, j = np.divmod(np.unique(i[keep] * len(centres) + j[keep]), len(centres))
     # i is cut by the plane through the source and j, and the other way round
     t, across_i = _cut(source, edges, i, j)
     s, across_j = _cut(source, edges, j, i)

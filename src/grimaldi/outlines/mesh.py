@@ -2,7 +2,7 @@
 
 An edge bounds the light exactly where all its triangles lie on one side of it in the source's view: so borders of
 open meshes count, edges between coplanar faces do not, and neither winding nor the number of triangles at an edge
-matters. Each triangle's side is decided once, by one determinant: the edges of a closed mesh form closed loops.
+matters. Each triangle's side is decided once: the edges of a closed mesh form closed loops.
 """
 
 from __future__ import annotations
@@ -10,11 +10,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from grimaldi.outlines.candidate import Candidates, facing, toward
+from grimaldi.outlines.candidate import Candidates, edge_on, facing, toward
 from grimaldi.outlines.model import Integers, Reals
 from grimaldi.scene.model import Mesh, Source
-
-EDGE_ON = 1e-9  # cosine between a face's normal and the light
 
 
 def weld(mesh: Mesh) -> tuple[Reals, Integers]:
@@ -31,14 +29,21 @@ def has_corners(faces: Integers) -> NDArray[np.bool_]:
 
 
 def sides(source: Source, corners: Reals) -> Integers:
-    """±1: whether triangles (m, 3, 3) turn counter-clockwise along the rays of the source; edge-on ones count as +1."""
-    if source.position is not None:
-        a, b, c = np.moveaxis(corners - source.position, 1, 0)
-        turn = np.einsum("ij,ij->i", np.cross(a, b), c)
-    else:
-        a, b, c = np.moveaxis(corners, 1, 0)
-        turn = np.cross(b - a, c - a) @ source.direction
-    return np.where(turn < 0, -1, 1)
+    """±1: whether triangles (m, 3, 3) turn counter-clockwise along the rays of the source.
+
+    Edge-on ones turn as they would for the source a little nearer to their common middle: winding does not matter,
+    and a box in light along its walls is bounded by the border of its front.
+    """
+    a, area = corners[:, 0], areas(corners)
+    turn = -np.einsum("ij,ij->i", area, toward(source, a))
+    nearer = np.einsum("ij,ij->i", area, a - corners.mean(axis=(0, 1)))
+    return np.where(np.where(edge_on(source, area, a), nearer, turn) < 0, -1, 1)
+
+
+def areas(corners: Reals) -> Reals:
+    """Twice the area vectors (m, 3) of triangles (m, 3, 3)."""
+    a, b, c = np.moveaxis(corners, 1, 0)
+    return np.cross(b - a, c - a)
 
 
 def silhouette(mesh: Mesh, source: Source) -> Candidates:
@@ -50,7 +55,10 @@ def silhouette(mesh: Mesh, source: Source) -> Candidates:
     points, faces = weld(mesh)
     whole = has_corners(faces)
     index, faces = np.flatnonzero(whole), faces[whole]
-    side = sides(source, points[faces])
+    corners = points[faces]
+    if edge_on(source, areas(corners), corners[:, 0]).all():  # a sheet in the plane of its rays stops none
+        return Candidates.empty()
+    side = sides(source, corners)
 
     tail, head = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
     forward = tail < head
@@ -79,28 +87,24 @@ def normals_beside(
 ) -> tuple[Reals, np.ndarray]:
     """Normals (n, 2, 3) beside edges at x, the face towards the source first, and where face2 is that one."""
     corners = points[faces]
-    area = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    area = areas(corners)
     unit = area / np.maximum(np.linalg.norm(area, axis=1, keepdims=True), 1e-300)
     n1, n2 = facing(source, unit[face1], x), facing(source, unit[face2], x)
     two = face2 >= 0
+    out1, out2 = _furthest(n2, corners[face1] - x[:, None]), _furthest(n1, corners[face2] - x[:, None])
+    level1, level2 = edge_on(source, n1, x), edge_on(source, n2, x)
     # face2 is in front where it bulges out of the plane of face1 towards the source
-    swap = two & (_bulge(n1, corners[face2], x) > 0)
+    swap = two & np.where(level1, out1 < 0, out2 > 0)
+    # an edge-on face's normal points away from the other face, a lone one's from the middle of the mesh
+    inward = np.where(two, (out2 > 0) != swap, np.einsum("ij,ij->i", n1, x - points.mean(axis=0)) < 0)
+    n1 = np.where((level1 & inward)[:, None], -n1, n1)
+    n2 = np.where((two & level2 & ((out1 > 0) == swap))[:, None], -n2, n2)
     lit = np.where(swap[:, None], n2, n1)
     dark = np.where(two[:, None], -np.where(swap[:, None], n1, n2), 0.0)
-    # a face edge-on has no side that faces the source: its outside is where the other face is not
-    w = toward(source, x)
-    w = w / np.maximum(np.linalg.norm(w, axis=1, keepdims=True), 1e-300)
-    cosines = [np.einsum("ij,ij->i", n, w) for n in (n1, n2)]
-    edge_on = (two & (np.minimum(*cosines) < EDGE_ON))[:, None]
-    out1 = -n1 * np.sign(_bulge(n1, corners[face2], x))[:, None]
-    out2 = -n2 * np.sign(_bulge(n2, corners[face1], x))[:, None]
-    second = np.einsum("ij,ij->i", out2 - out1, w)[:, None] > 0
-    lit = np.where(edge_on, np.where(second, out2, out1), lit)
-    dark = np.where(edge_on, np.where(second, out1, out2), dark)
-    return np.stack([lit, dark], axis=1), np.where(edge_on, second, swap[:, None])[:, 0]
+    return np.stack([lit, dark], axis=1), swap
 
 
-def _bulge(normals: Reals, corners: Reals, x: Reals) -> Reals:
-    """How far the furthest corner of triangles (n, 3, 3) lies from the planes through x (n, 3), along their normals."""
-    heights = np.einsum("ij,ikj->ik", normals, corners - x[:, None])
-    return np.take_along_axis(heights, np.abs(heights).argmax(axis=1)[:, None], axis=1)[:, 0]
+def _furthest(normals: Reals, corners: Reals) -> Reals:
+    """Of corners (n, 3, 3) the height (n,) along normals that is the furthest from 0."""
+    height = np.einsum("ij,ikj->ik", normals, corners)
+    return np.take_along_axis(height, np.abs(height).argmax(axis=1)[:, None], axis=1)[:, 0]

@@ -12,9 +12,11 @@ from numpy.typing import NDArray
 from grimaldi.errors import InputError
 from grimaldi.scene.model import Body, Cylinder, Disk, Geometry, Mesh, Sphere
 from grimaldi.scene.planar import PlanarOutline
+from grimaldi.scene.triangles import as_mesh
 
 Reals = NDArray[np.float64]
 
+FACES_ROUND = 4096  # of a cylinder: they lie 3e-7 radii inside it
 FLAT = 1e-6  # thickness over extent below which vertices lie in one plane: a few roundings of Float32
 
 _SQUARE = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
@@ -71,12 +73,13 @@ def blockers(mi_scene: Any) -> Any:
     """A Mitsuba scene that shares all shapes that stop light, also those that do not diffract; None without any.
 
     Only what has a null BSDF or part (apertures, masks, media) is left out. Embree's robust mode finds rays that
-    meet an edge exactly, as those along an outline do.
+    meet an edge exactly, as those along an outline do. Of cylinders it holds the faces: Mitsuba's own intersection
+    solves a quadratic in Float32, which from 150 radii away misses a cylinder's wall by a twentieth of its radius.
     """
     opaque = [shape for shape in mi_scene.shapes() if not _lets_through(shape)]
     if not opaque:
         return None
-    return _sharing(opaque, embree_use_robust_intersections=True)
+    return _sharing([_faces(shape) for shape in opaque], embree_use_robust_intersections=True)
 
 
 def with_shapes(mi_scene: Any, shapes: Sequence[Any]) -> Any:
@@ -105,6 +108,26 @@ def is_aperture(shape: Any) -> bool:
 def carries_light(shape: Any) -> bool:
     """Whether an emitter or a sensor sits on a shape."""
     return shape.is_emitter() or shape.is_sensor()
+
+
+def _faces(shape: Any) -> Any:
+    """A cylinder's faces; any other shape itself."""
+    import mitsuba as mi
+
+    if shape.class_name() != "Cylinder":
+        return shape
+    angle = 2 * np.pi * np.arange(FACES_ROUND) / FACES_ROUND
+    wall = tube(Cylinder(_to_world(shape)), np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1))
+    return as_mesh(mi, shape.id(), wall.vertices, wall.faces, mi.Properties())
+
+
+def tube(cylinder: Cylinder, ring: Reals) -> Mesh:
+    """A cylinder's wall as flat faces between points (n, 3) of its unit circle."""
+    n = len(ring)
+    local = np.concatenate([ring, ring + [0, 0, 1]])
+    here, there = np.arange(n), (np.arange(n) + 1) % n
+    faces = np.concatenate([np.stack([here, there, n + there], axis=1), np.stack([here, n + there, n + here], axis=1)])
+    return Mesh(local @ cylinder.to_world[:3, :3].T + cylinder.to_world[:3, 3], faces)
 
 
 def _lets_through(shape: Any) -> bool:
