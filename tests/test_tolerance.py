@@ -105,6 +105,54 @@ def test_the_error_stays_below_what_is_asked(seed):
         assert (error[~beside] <= tolerance).all()
 
 
+@settings(max_examples=60, deadline=None, derandomize=True, database=None)
+@given(st.integers(0, 2**32 - 1))
+def test_long_ways_wide_outlines_and_large_coordinates(seed):
+    """Ways of up to 1e8 λ, outlines 0.2 to 2e5 λ wide, and all of it moved by up to 1e6 outlines through to_world."""
+    rng = np.random.default_rng(seed)
+    size = 10 ** rng.uniform(-1, 5)
+    loop = polygon(rng)
+    loop *= size / np.abs(loop).max()
+    least = np.log10(max(size**2 / 3e3, 1.0))  # fewer fringes than the reference can count
+    d = np.array([rng.uniform(-0.3, 0.3), rng.uniform(-0.3, 0.3), 1.0])
+    lamp = -(10 ** rng.uniform(least, 8)) * d
+    light = oracle.Spherical(lamp)
+    rim = loop[0] + rng.uniform(0, 1, 4)[:, None] * (loop[1] - loop[0])
+    aside = np.array([0, 1e-6, -1e-2, 1.0])[:, None] * size * rng.normal(size=(4, 3)) * [1, 1, 0]
+    points = rim + (rim - lamp) * (10 ** rng.uniform(least, 8) / -lamp[2]) + aside
+    exact = oracle.polygon_factor(light, points, loop, 1.0)
+    offset = np.round(10 ** rng.uniform(0, 6) * size * rng.normal(size=3))
+    to_world = np.eye(4)
+    to_world[:3, 3] = offset
+    source = {"type": "coherent_point", "position": (lamp + offset).tolist()}
+    scene = grimaldi.load({"type": "scene", "light": source}, outlines=[grimaldi.PlanarOutline(loop[:, :2], to_world)])
+    for tolerance in (1e-3, 1e-6):
+        m, error = factors(scene, points + offset, Options(tolerance))
+        assert (np.abs(m - exact) <= np.maximum(tolerance, error)).all()
+        assert (error <= tolerance).all()
+
+
+def test_a_starshade():
+    """22 petals of 400 corners, as a mask a few Fresnel zones wide: 1e-10 in the deep of its shadow."""
+    share = np.linspace(0, 1, 200)
+    radius, width = 6 + 7 * share, np.exp(-((1.2 * share) ** 6) * 3)
+    angle = np.pi / 22 * width
+    petal = np.concatenate(
+        [np.stack([radius, -angle], 1), np.stack([radius, angle], 1)[:0:-1]]
+    )  # its last corner is the next one's first
+    loop = np.concatenate([np.stack([r := petal[:, 0], petal[:, 1] + 2 * np.pi * i / 22], 1) for i in range(22)])
+    loop = 1e3 * np.stack([loop[:, 0] * np.cos(loop[:, 1]), loop[:, 0] * np.sin(loop[:, 1]), 0 * r.repeat(22)], 1)
+    points = np.array([[0, 0, 1e7], [300, -200, 1e7], [2000, 900, 1e7]])
+    light = oracle.Plane((0, 0, 1))
+    exact = 1 - oracle.polygon_factor(light, points, loop, 1.0)
+    mask = grimaldi.PlanarOutline(loop[:, :2], np.eye(4), hole=False)
+    scene = grimaldi.load({"type": "scene", "light": emitter(light)}, outlines=[mask])
+    m, error = factors(scene, points, Options(1e-10, "double"))
+    assert abs(exact[0]) < 0.1
+    np.testing.assert_allclose(m, exact, rtol=0, atol=1e-10)
+    assert error.max() <= 1e-10
+
+
 @pytest.mark.parametrize("place", PLACES)
 def test_the_reference_itself(place):
     """The reference of these tests is Kirchhoff's area integral, which knows no edges."""

@@ -67,7 +67,7 @@ def _sommerfeld(boundary: sommerfeld.Boundary) -> Case:
 
 
 def double_knife_edge() -> Case:
-    """Single diffraction against the double integral: edges 20 λ out of line, and in line."""
+    """The wave of one edge past another against the double integral: edges 20 λ out of line, and in line."""
     x, tolerance = np.linspace(-120, 60, 181) + 0.25, 1e-5
     points, apart = line(x, 1000), 1000.0
     aligned, more = factor(points, tolerance, bodies=_screens(0.0, 0.0, apart))
@@ -82,8 +82,8 @@ def double_knife_edge() -> Case:
         tolerance,
         0.0,
         seconds + more,
-        f"single diffraction at edges {apart:g} λ apart and 20 λ out of line is rms {rms(m, expected):.2g} from "
-        f"double; up to {in_line:.2g} where they are in line",
+        f"one edge past another, {apart:g} λ apart and 20 λ out of line, is rms {rms(m, expected):.2g} from double "
+        f"diffraction; up to {in_line:.2g} where they are in line",
         Curve(x, m, expected, "x [λ], shadow right", "M"),
     )
 
