@@ -29,7 +29,7 @@ from grimaldi.scene.model import Scene, Source
 
 mi: Any = mitsuba  # the stubs refuse numbers where arrays are asked for
 
-HIDDEN_END = 0.02  # of the tolerance: what an untested X→P may at most leave behind
+UNASKED = 0.5  # of the tolerance: what all pieces whose X→P goes untested may add to M, each the same
 
 
 class Problem(NamedTuple):
@@ -87,7 +87,7 @@ def _factor(
     """M = geometric ± (1/2π) sum, and what is known of its error: tails, panels, rounding."""
     scale = sign / (2 * np.pi)
     tails = dr.sqrt(sums.err_real * sums.err_real + sums.err_imag * sums.err_imag) / np.pi
-    error = tails + (rule.share + _rounding(tab, fr, k, margins))
+    error = tails + sums.unasked + dr.sqrt(sums.rounding2) / np.pi + (rule.share + _rounding(tab, fr, k, margins))
     return Factor(geometric + scale * sums.real, scale * sums.imag, error)
 
 
@@ -155,7 +155,7 @@ def _bodies(problem: Problem, precision: Types) -> Evaluate:
             tab,
             tab.device(k),
             rule,
-            HIDDEN_END * options.tolerance,
+            UNASKED * options.tolerance / (dr.width(tab.ranges) - 1),
             probe if options.occlusion != "none" else None,
             None if grazing is None else near(fr, grazing, tab.device(k), receivers),
             options.rim == "smooth",

@@ -43,6 +43,7 @@ def damped(wave: Wave, frame: Frame, ln: Line, length: Any, radius: Any, k: Any)
         middle * wave.imag,
         dr.fma(middle, wave.err_real, spread * wave.real),
         dr.fma(middle, wave.err_imag, spread * wave.imag),
+        wave.rounding2,
     )
 
 

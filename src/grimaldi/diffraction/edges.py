@@ -22,12 +22,14 @@ from grimaldi.diffraction.table import Piece, Segment, Table
 
 
 class Sum(NamedTuple):
-    """Σ ∫ C e^{ikΔ} dφ and its error estimate."""
+    """Σ ∫ C e^{ikΔ} dφ, its error estimate, the square of its ends' rounding, and |M| taken for visible unasked."""
 
     real: Any
     imag: Any
     err_real: Any
     err_imag: Any
+    rounding2: Any
+    unasked: Any
 
 
 class Nearest(NamedTuple):
@@ -83,7 +85,7 @@ def planar_sum(fr: Frame, tab: Table, k: Any, rule: Rule, active: Any) -> tuple[
     """The sum over whole planar loops, nothing in between, and n = (1/2π)∮dφ as an exact count."""
     F = tab.types.Float
     real, imag, err_real, err_imag = F(0), F(0), F(0), F(0)
-    ray2, receiver2 = F(dr.inf), F(dr.inf)
+    ray2, receiver2, rounding2 = F(dr.inf), F(dr.inf), F(0)
     n, j = F(0), dr.uint32_array_t(F)(0)
     _, across = _basis(fr.a)
     while active & (j < tab.size):
@@ -93,10 +95,11 @@ def planar_sum(fr: Frame, tab: Table, k: Any, rule: Rule, active: Any) -> tuple[
         n += _turn(fr, seg, across, ln.kappa)[0]
         real, imag = real + wave.real, imag + wave.imag
         err_real, err_imag = err_real + wave.err_real, err_imag + wave.err_imag
+        rounding2 += wave.rounding2
         ray2 = dr.minimum(ray2, closest(fr, seg, ln))
         receiver2 = dr.minimum(receiver2, to_receiver(fr, seg, ln))
         j += 1
-    return Sum(real, imag, err_real, err_imag), n, Margins(ray2, receiver2)
+    return Sum(real, imag, err_real, err_imag, rounding2, F(0)), n, Margins(ray2, receiver2)
 
 
 @dr.syntax
@@ -177,7 +180,7 @@ def body_sum(
         p = p + probe.epsilon(p) * receivers.n  # off its own surface
     real, imag, err_real, err_imag = F(0), F(0), F(0), F(0)
     nearest2, nearest_segment, nearest_piece = F(dr.inf), U(0), U(0)
-    receiver2 = F(dr.inf)
+    receiver2, rounding2, unasked = F(dr.inf), F(0), F(0)
     i = U(0)
     while receivers.active & (i < tab.n_pieces):
         piece = tab.piece(i)
@@ -188,6 +191,7 @@ def body_sum(
             assert probe is not None
             left = _cut_off(fr, piece, tab.segment(piece.first).e, k)
             tested = acts & (left > share)
+            unasked += dr.select(acts & ~tested, left, 0)
             if tested:
                 x = mi.Point3f(piece.middle + constant(tab.types.Vector, tab.centre))
                 visible = acts & probe.reaches(x, piece, p, tested)
@@ -211,6 +215,7 @@ def body_sum(
                 )
             real, imag = real + wave.real, imag + wave.imag
             err_real, err_imag = err_real + wave.err_real, err_imag + wave.err_imag
+            rounding2 += wave.rounding2
             receiver2 = dr.minimum(receiver2, to_receiver(fr, seg, ln))
             d2 = closest(fr, seg, ln)
             closer = visible & (d2 < nearest2)
@@ -220,7 +225,7 @@ def body_sum(
             j += 1
         i += 1
     nearest = Nearest(nearest2, nearest_segment, nearest_piece)
-    return Sum(real, imag, err_real, err_imag), nearest, Margins(nearest2, receiver2)
+    return Sum(real, imag, err_real, err_imag, rounding2, unasked), nearest, Margins(nearest2, receiver2)
 
 
 @dr.syntax

@@ -281,18 +281,24 @@ def _tail(frame: Frame, st: Path, Y: Any, rule: Rule) -> tuple[Any, Any]:
     return scale * (imag * cos - real * sin), scale * (real * cos + imag * sin)
 
 
-def _tail_error(st: Path, Y: Any, rule: Rule) -> Any:
-    """Of a tail from Y on, relative to it: what the rule leaves, and the rounding of its phase."""
-    return rule.tail_error * dr.square(dr.square(rule.K / Y)) + 4 * dr.epsilon(Y) * (Y + st.A)
+def _tail_error(Y: Any, rule: Rule) -> Any:
+    """What the rule leaves of a tail from Y on, relative to it."""
+    return rule.tail_error * dr.square(dr.square(rule.K / Y))
+
+
+def _rounded(st: Path, Y: Any, re: Any, im: Any) -> Any:
+    """The square of what the rounding of its phase does to a tail (re, im): of no two ends the same."""
+    return (re * re + im * im) * dr.square(4 * dr.epsilon(Y) * (Y + st.A))
 
 
 class Wave(NamedTuple):
-    """A segment's wave, real and imaginary part, and the same of its error."""
+    """A segment's wave, real and imaginary part, the same of its error, and the square of its ends' rounding."""
 
     real: Any
     imag: Any
     err_real: Any
     err_imag: Any
+    rounding2: Any
 
     def times(self, real: Any, imag: Any) -> Wave:
         """By a complex factor."""
@@ -301,6 +307,7 @@ class Wave(NamedTuple):
             real * self.imag + imag * self.real,
             real * self.err_real - imag * self.err_imag,
             real * self.err_imag + imag * self.err_real,
+            self.rounding2,
         )
 
 
@@ -314,18 +321,20 @@ def segment_wave(frame: Frame, ln: Line, length: Any, k: Any, rule: Rule, active
     both = (x0 < 0) & (x1 > 0)
     near, far = dr.minimum(Y0, Y1), dr.maximum(Y0, Y1)
     K = Float(rule.K)
-    real, imag, err_r, err_i = Float(0), Float(0), Float(0), Float(0)
+    real, imag, err_r, err_i, rounding2 = Float(0), Float(0), Float(0), Float(0), Float(0)
     if active & (far > K):
         # out of the far end
         re, im = _tail(frame, st, far, rule)
         real, imag = real - re, imag - im
-        left = _tail_error(st, far, rule)
+        rounding2 += _rounded(st, far, re, im)
+        left = _tail_error(far, rule)
         err_r, err_i = err_r - left * re, err_i - left * im
     if active & (near > K):
         re, im = _tail(frame, st, near, rule)
         flip = dr.select(both, Float(-1), Float(1))
         real, imag = dr.fma(flip, re, real), dr.fma(flip, im, imag)
-        left = flip * _tail_error(st, near, rule)
+        rounding2 += _rounded(st, near, re, im)
+        left = flip * _tail_error(near, rule)
         err_r, err_i = dr.fma(left, re, err_r), dr.fma(left, im, err_i)
     inside = both | (near <= K)
     if active & inside:
@@ -348,6 +357,7 @@ def segment_wave(frame: Frame, ln: Line, length: Any, k: Any, rule: Rule, active
         real * turn_i + imag * turn_r,
         err_r * turn_r - err_i * turn_i,
         err_r * turn_i + err_i * turn_r,
+        dr.square(st.front) * rounding2,
     )
 
 

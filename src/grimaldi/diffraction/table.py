@@ -100,11 +100,14 @@ def cut(outline: Outline) -> NDArray[np.int64]:
 
 
 def needs_double(outline: Outline, k: float, options: Options) -> bool:
-    """Float32 rounding grows as √(kΔ): enough at 5e-4 up to outlines of 1e6 radians, but for receivers beside edges."""
+    """Whether Float32 corners, n of them in an outline k·extent radians wide, leave too much of the tolerance.
+
+    Each is off by some k·extent·2⁻²⁴ radians, and no two alike. Where receivers lie beside edges, `boundary` tells.
+    """
     if options.precision == "double" or options.tolerance < 5e-4:
         return True
-    ends = np.concatenate([outline.start, outline.end])
-    return k * float(np.ptp(ends, axis=0).max()) > 1e6
+    extent = np.ptp(np.concatenate([outline.start, outline.end]), axis=0).max()
+    return k * float(extent) * len(outline) ** 0.5 * 2.0**-24 > 3 * options.tolerance
 
 
 def _distance(source: Source, outline: Outline) -> float:
