@@ -13,10 +13,8 @@ import oracle
 import pytest
 from optics import affine, factor, mesh, shape
 
-import grimaldi
 from grimaldi.diffraction.knife_edge import amplitude
 from grimaldi.errors import InputError
-from grimaldi.outlines.silhouettes import loops, same_loop, silhouettes
 from grimaldi.reference import fresnel_edge
 
 LAMP = oracle.Spherical((0, 0, -40))
@@ -136,26 +134,6 @@ def test_a_single_convex_body_grazes_nothing(kind, tmp_path: Path):
     body = ball(tmp_path) if kind == "mesh" else shape(kind, affine(8))
     graded, binary = (factor(LAMP, points, body, tolerance=1e-4, occlusion=o) for o in (True, "binary"))
     np.testing.assert_array_equal(graded, binary)
-
-
-def test_loops_are_bodies_and_the_separate_parts_of_meshes(tmp_path):
-    corners = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0.0]])
-    both = np.concatenate([corners, corners + [5, 0, 3]])
-    faces = np.array([[0, 1, 2], [0, 2, 3]])
-    scene = {"type": "scene", "light": {"type": "coherent_directional", "direction": [0.0, 0, 1]}}
-    scene["two plates"] = mesh(tmp_path / "two.obj", both, np.concatenate([faces, faces + 4]))
-    scene["ball"] = shape("sphere", affine(0.9, at=(0, 0, 8)))  # hidden behind the first plate
-    loaded = grimaldi.load(scene)
-    source = loaded.sources[0]
-    whole = silhouettes(loaded, source)
-    loop = loops(whole)
-    assert loop.max() == 2
-    for part in range(3):
-        assert len(np.unique(whole.body[loop == part])) == 1
-    lit = grimaldi.outline(loaded, source)
-    of = same_loop(lit, whole, loop)
-    assert len(np.unique(of)) == 2, "the ball's outline is not lit"
-    np.testing.assert_array_equal(of == of[0], (lit.start[:, 0] > 2) == (lit.start[0, 0] > 2))
 
 
 def test_occlusion_says_what_it_takes():

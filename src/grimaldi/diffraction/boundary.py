@@ -24,7 +24,7 @@ from grimaldi.diffraction.screen import beyond
 from grimaldi.diffraction.segment import Rule
 from grimaldi.diffraction.table import Table, needs_double, table
 from grimaldi.outlines.model import Outline
-from grimaldi.outlines.silhouettes import loops, same_loop, silhouettes
+from grimaldi.outlines.silhouettes import silhouettes
 from grimaldi.scene.model import Scene, Source
 
 mi: Any = mitsuba  # the stubs refuse numbers where arrays are asked for
@@ -143,10 +143,8 @@ def _bodies(problem: Problem, precision: Types) -> Evaluate:
     probe = rays(scene, source, outline.sag)
     tab, grazing = table(outline, source, precision), None
     if options.occlusion == "graded":
-        whole = silhouettes(scene, source)
-        loop = loops(whole)
-        tab = table(outline, source, precision, loop=same_loop(outline, whole, loop))
-        grazing = chords(whole, loop, tab.centre, precision)
+        tab = table(outline, source, precision, loop=outline.body)
+        grazing = chords(silhouettes(scene, source), tab.centre, precision)
 
     def evaluate(receivers: Receivers) -> Factor:
         fr = frame(source, receivers.p, tab)

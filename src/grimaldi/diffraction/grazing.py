@@ -26,7 +26,7 @@ from grimaldi.diffraction.knife_edge import amplitude
 from grimaldi.diffraction.model import Receivers
 from grimaldi.diffraction.segment import line, sincos
 from grimaldi.diffraction.table import Piece, cut
-from grimaldi.outlines.model import Integers, Outline
+from grimaldi.outlines.model import Outline
 from grimaldi.scene.model import Vector
 
 FAINT = 0.01  # |M| of a wave that is not worth a second edge
@@ -44,10 +44,10 @@ class Chord(NamedTuple):
 
 
 class Chords(NamedTuple):
-    """Whole silhouettes as flat device buffers, loop after loop, about the centre of the outlines' table."""
+    """Whole silhouettes as flat device buffers, body after body, about the centre of the outlines' table."""
 
     records: Any
-    ranges: Any  # first chord of each loop, and their number
+    ranges: Any  # first chord of each body's loops, and their number
     size: int
     types: Types
 
@@ -67,7 +67,7 @@ class Passing(NamedTuple):
 
 
 class Near(NamedTuple):
-    """The two loops of silhouettes that the ray S→P passes closest by, and v² there."""
+    """The two bodies whose loops of silhouettes the ray S→P passes closest by, and v² there."""
 
     silhouettes: Chords
     loop: Any
@@ -76,13 +76,13 @@ class Near(NamedTuple):
     next_v2: Any
 
 
-def chords(outline: Outline, loop: Integers, centre: Vector, types: Types) -> Chords | None:
-    """Whole silhouettes whose segments belong to `loop` (n,), packed; None where there is a single one."""
-    if len(outline) == 0 or loop.max() == 0:
+def chords(outline: Outline, centre: Vector, types: Types) -> Chords | None:
+    """Whole silhouettes, packed; None where no other body's is there to be grazed."""
+    if len(np.unique(outline.body)) < 2:
         return None
     ranges = cut(outline)
     first, last = ranges[:-1], ranges[1:] - 1
-    of = loop[first]
+    of = outline.body[first]
     order = np.argsort(of, kind="stable")
     start, end = outline.start[first] - centre, outline.end[last] - centre
     length = np.maximum(np.linalg.norm(end - start, axis=1, keepdims=True), 1e-300)
