@@ -143,7 +143,6 @@ def _bodies(problem: Problem, precision: Types) -> Evaluate:
     probe = rays(scene, source, outline.sag)
     tab, grazing = table(outline, source, precision), None
     if options.occlusion == "graded":
-        tab = table(outline, source, precision, loop=outline.body)
         grazing = chords(silhouettes(scene, source), tab.centre, precision)
 
     def evaluate(receivers: Receivers) -> Factor:

@@ -197,10 +197,10 @@ def body_sum(
                 visible = acts & probe.reaches(x, piece, p, tested)
             if dr.hint(beside is not None, mode="scalar"):
                 assert beside is not None
-                loop, close = other_than(beside, piece)
+                body, close = other_than(beside, piece)
                 close &= tested & (left > FAINT)
                 if close:
-                    past_real, past_imag = grazed(fr, beside.silhouettes, piece, loop, visible, k, close)
+                    past_real, past_imag = grazed(fr, beside.silhouettes, piece, body, visible, k, close)
             acts = visible | (past_real != 0) | (past_imag != 0)
         j = U(piece.first)
         while acts & (j < piece.end):

@@ -39,7 +39,7 @@ class Chord(NamedTuple):
     start: Any
     e: Any
     length: Any
-    loop: Any
+    body: Any
     outward: Any
 
 
@@ -47,7 +47,7 @@ class Chords(NamedTuple):
     """Whole silhouettes as flat device buffers, body after body, about the centre of the outlines' table."""
 
     records: Any
-    ranges: Any  # first chord of each body's loops, and their number
+    ranges: Any  # first chord of each body, and their number
     size: int
     types: Types
 
@@ -67,12 +67,12 @@ class Passing(NamedTuple):
 
 
 class Near(NamedTuple):
-    """The two bodies whose loops of silhouettes the ray S→P passes closest by, and v² there."""
+    """The two bodies whose silhouettes the ray S→P passes closest by, and v² there."""
 
     silhouettes: Chords
-    loop: Any
+    body: Any
     v2: Any
-    next_loop: Any
+    next_body: Any
     next_v2: Any
 
 
@@ -112,12 +112,12 @@ def passing(way: Frame, chord: Chord, k: float) -> Passing:
 
 @dr.syntax
 def near(fr: Frame, silhouettes: Chords, k: float, receivers: Receivers) -> Near:
-    """The loops worth a look at each receiver; on a surface, only what rises above its horizon."""
+    """The bodies worth a look at each receiver; on a surface, only what rises above its horizon."""
     F = silhouettes.types.Float
     n = silhouettes.types.Vector(receivers.n)
     p = fr.foot + fr.z2 * fr.a
     everywhere = dr.squared_norm(n) == 0
-    loop, v2, next_loop, next_v2 = F(-1), F(dr.inf), F(-1), F(dr.inf)
+    body, v2, next_body, next_v2 = F(-1), F(dr.inf), F(-1), F(dr.inf)
     j = dr.uint32_array_t(F)(0)
     while receivers.active & (j < silhouettes.size):
         chord = silhouettes.chord(j)
@@ -125,30 +125,30 @@ def near(fr: Frame, silhouettes: Chords, k: float, receivers: Receivers) -> Near
         x = chord.start + at.t * chord.e - p
         rises = everywhere | (dr.dot(n, x) > 1e-4 * dr.norm(x))
         v2_j = dr.select(rises, at.v2, dr.inf)
-        other = chord.loop != loop
+        other = chord.body != body
         closest = v2_j < v2
         moves_down = closest & other
         second = ~closest & other & (v2_j < next_v2)
-        next_loop = dr.select(moves_down, loop, dr.select(second, chord.loop, next_loop))
+        next_body = dr.select(moves_down, body, dr.select(second, chord.body, next_body))
         next_v2 = dr.select(moves_down, v2, dr.select(second, v2_j, next_v2))
-        loop = dr.select(closest, chord.loop, loop)
+        body = dr.select(closest, chord.body, body)
         v2 = dr.select(closest, v2_j, v2)
         j += 1
-    return Near(silhouettes, loop, v2, next_loop, next_v2)
+    return Near(silhouettes, body, v2, next_body, next_v2)
 
 
 def other_than(found: Near, piece: Piece) -> tuple[Any, Any]:
-    """The nearest loop that a piece does not belong to, and whether it is near enough to matter."""
-    own = found.loop == piece.loop
+    """The nearest body that a piece is no part of, and whether it is near enough to matter."""
+    own = found.body == piece.body
     v2 = dr.select(own, found.next_v2, found.v2)
-    return dr.select(own, found.next_loop, found.loop), v2 < WIDEST * WIDEST
+    return dr.select(own, found.next_body, found.body), v2 < WIDEST * WIDEST
 
 
 @dr.syntax
 def grazed(
-    fr: Frame, silhouettes: Chords, piece: Piece, loop: Any, visible: Any, k: float, active: Any
+    fr: Frame, silhouettes: Chords, piece: Piece, body: Any, visible: Any, k: float, active: Any
 ) -> tuple[Any, Any]:
-    """The second term of M₁₂ over M₁ (real, imaginary) for the way from a piece's middle to P past a loop.
+    """The second term of M₁₂ over M₁ (real, imaginary) for the way from a piece's middle to P past a body.
 
     For P on the dark side of the light at X; on the lit side it is the opposite. A way that makes a wide angle
     with X→X₂ grazes nothing, nor does one that something else blocks.
@@ -158,7 +158,7 @@ def grazed(
     d = fr.foot + fr.z2 * fr.a - piece.middle
     s = dr.norm(d)
     way = Frame(d / s, piece.middle, F(0), s, s, False)
-    of = U(dr.maximum(loop, 0))
+    of = U(dr.maximum(body, 0))
     j = dr.gather(U, silhouettes.ranges, of, active)
     end = dr.gather(U, silhouettes.ranges, of + 1, active)
     best, v2 = U(j), F(dr.inf)

@@ -33,7 +33,7 @@ class Piece(NamedTuple):
     reach: Any  # half its length
     lit: Any  # normals of the faces at the middle, towards the source first
     dark: Any
-    loop: Any  # the silhouette that it belongs to (`grazing`)
+    body: Any  # of the scene; below 0 for planar outlines
     closed: Any  # 1 where two faces meet, 0 at the border of a sheet
     outward: Any
     behind: Any  # how far behind it its own body comes next
@@ -123,12 +123,8 @@ def table(
     source: Source,
     types: Types,
     ranges: NDArray[np.int64] | None = None,
-    loop: NDArray[np.int64] | None = None,
 ) -> Table:
-    """Pack what a source sees; its pieces begin at the segments `ranges`, the last of which is their number (`cut`).
-
-    loop (n,): the silhouette that each segment belongs to, where X→P may graze others.
-    """
+    """Pack what a source sees; its pieces begin at the segments `ranges`, the last of which is their number (`cut`)."""
     ends = np.concatenate([outline.start, outline.end])
     low, high = ends.min(0), ends.max(0)
     # on a coarse grid, so that differences to it are exact and points stay as near each other as they were
@@ -144,7 +140,7 @@ def table(
     reach = 0.5 * np.add.reduceat(length[:, 0], ranges[:-1])[:, None]
     normals = outline.normals[middle]
     closed = (np.linalg.norm(normals[:, 1], axis=1) > 0).astype(float)[:, None]
-    of = np.zeros_like(reach) if loop is None else loop[middle][:, None]
+    of = outline.body[middle].astype(float)[:, None]
     behind = np.minimum.reduceat(np.minimum(outline.behind, 1e30), ranges[:-1])[:, None]
     pieces = np.concatenate(
         [target, reach, normals[:, 0], closed, normals[:, 1], of, outline.outward[middle], behind], 1
