@@ -280,7 +280,8 @@ def test_the_parts_of_a_gltf_file_stand_in_their_places(tmp_path):
     scene.export(tmp_path / "x.glb")
     both = [shape("cube", affine((2.5, 1.5, 1), at=at)) for at in ((-4, 0, 0), (4, 1, 0))]
     ours = {"type": "gltf", "filename": str(tmp_path / "x.glb"), "bsdf": GREY}
-    np.testing.assert_allclose(factor(LAMP, ACROSS, ours, **FINE), factor(LAMP, ACROSS, *both, **FINE), atol=1e-5)
+    alike: dict[str, Any] = {**FINE, "occlusion": "binary"}  # the edges of two bodies graze each other, of one mesh not
+    np.testing.assert_allclose(factor(LAMP, ACROSS, ours, **alike), factor(LAMP, ACROSS, *both, **alike), atol=1e-5)
 
 
 # ------------------------------------------------------------------------------------ wrong input
