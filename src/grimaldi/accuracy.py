@@ -54,9 +54,7 @@ class Misses:
 
 def _nearest(scene: Scene, seen: Outline, p: Vector) -> str:
     """The outline segment nearest to a point, in words."""
-    span = seen.end - seen.start
-    t = np.clip(((p - seen.start) * span).sum(1) / np.maximum((span * span).sum(1), 1e-300), 0, 1)
-    i = int(np.linalg.norm(seen.start + t[:, None] * span - p, axis=1).argmin())
+    i = int(seen.distances(p).argmin())
     body = int(seen.body[i])
     name = scene.bodies[body].name if body >= 0 else f"planar outline {-1 - body}"
     ends = (", ".join(f"{x:.6g}" for x in end) for end in (seen.start[i], seen.end[i]))

@@ -40,6 +40,7 @@ class Problem(NamedTuple):
     outline: Outline
     k: float
     options: Options
+    grazed: Outline | None  # all silhouettes, for occlusion "graded"
 
     def rule(self) -> Rule:
         """For segments, with what the polygons of curves leave as part of its share."""
@@ -55,11 +56,12 @@ def boundary(scene: Scene, source: Source, outline: Outline, k: float, options: 
 
     Raises InputError in variants without vectorised arrays.
     """
-    problem = Problem(scene, source, outline, k, options)
     if len(outline) == 0:
         if scene.screen or scene.blockers is None:
             return none.none(scene, source, outline, k, options)
-        return _rays_alone(problem)
+        return _rays_alone(scene, source)
+    graded = options.occlusion == "graded" and not scene.screen
+    problem = Problem(scene, source, outline, k, options, silhouettes(scene, source) if graded else None)
     of_kind = _planar if scene.screen else _bodies
     double = of_kind(problem, types(double=True))
     if needs_double(outline, k, options):
@@ -124,9 +126,9 @@ def _planar(problem: Problem, precision: Types) -> Evaluate:
     return evaluate
 
 
-def _rays_alone(problem: Problem) -> Evaluate:
+def _rays_alone(scene: Scene, source: Source) -> Evaluate:
     """Bodies without an outline, such as an empty room: the same shadow rays, which serve in its corners too."""
-    probe = rays(problem.scene, problem.source)
+    probe = rays(scene, source)
 
     def evaluate(receivers: Receivers) -> Factor:
         p = mi.Point3f(receivers.p)
@@ -138,12 +140,11 @@ def _rays_alone(problem: Problem) -> Evaluate:
 
 
 def _bodies(problem: Problem, precision: Types) -> Evaluate:
-    scene, source, outline, k, options = problem
+    scene, source, outline, k, options, grazed = problem
     rule = problem.rule()
     probe = rays(scene, source, outline.sag)
-    tab, grazing = table(outline, source, precision), None
-    if options.occlusion == "graded":
-        grazing = chords(silhouettes(scene, source), tab.centre, precision)
+    tab = table(outline, source, precision)
+    grazing = None if grazed is None else chords(grazed, tab.centre, precision)
 
     def evaluate(receivers: Receivers) -> Factor:
         fr = frame(source, receivers.p, tab)

@@ -351,14 +351,8 @@ def segment_wave(frame: Frame, ln: Line, length: Any, k: Any, rule: Rule, active
             err_r, err_i = dr.fma(count * rule.tail_error, re, err_r), dr.fma(count * rule.tail_error, im, err_i)
     sin, cos = sincos(st.A)
     scale = dr.mulsign(st.front, ln.kappa)
-    turn_r, turn_i = scale * cos, scale * sin
-    return Wave(
-        real * turn_r - imag * turn_i,
-        real * turn_i + imag * turn_r,
-        err_r * turn_r - err_i * turn_i,
-        err_r * turn_i + err_i * turn_r,
-        dr.square(st.front) * rounding2,
-    )
+    wave = Wave(real, imag, err_r, err_i, dr.square(st.front) * rounding2)
+    return wave.times(scale * cos, scale * sin)
 
 
 def _reach(st: Path, Y: Any, rule: Rule) -> Any:

@@ -110,14 +110,6 @@ def needs_double(outline: Outline, k: float, options: Options) -> bool:
     return k * float(extent) * len(outline) ** 0.5 * 2.0**-24 > 3 * options.tolerance
 
 
-def _distance(source: Source, outline: Outline) -> float:
-    if source.position is None:
-        return np.inf
-    span, v = outline.end - outline.start, source.position - outline.start
-    t = np.clip((v * span).sum(1) / np.maximum((span * span).sum(1), 1e-300), 0, 1)
-    return float(np.linalg.norm(v - t[:, None] * span, axis=1).min())
-
-
 def table(
     outline: Outline,
     source: Source,
@@ -149,7 +141,7 @@ def table(
     return Table(
         centre,
         float(np.linalg.norm(np.concatenate([X0, X1]), axis=1).max()),
-        _distance(source, outline),
+        np.inf if source.position is None else float(outline.distances(source.position).min()),
         on_device(index, len(outline)),
         on_device(index, len(middle)),
         types.buffer(segments),

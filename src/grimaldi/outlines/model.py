@@ -36,6 +36,12 @@ class Outline:
     def __len__(self) -> int:
         return len(self.start)
 
+    def distances(self, point: Reals) -> Reals:
+        """How far each segment (n,) is from a point (3,)."""
+        span, v = self.end - self.start, point - self.start
+        t = np.clip((v * span).sum(1) / np.maximum((span * span).sum(1), 1e-300), 0, 1)
+        return np.linalg.norm(v - t[:, None] * span, axis=1)
+
     @staticmethod
     def empty() -> Outline:
         """Nothing stands in the light."""
