@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from hashlib import blake2b
+from itertools import zip_longest
 from typing import Any, NamedTuple
 
 import drjit as dr
@@ -16,14 +17,18 @@ from grimaldi.camera import seen
 from grimaldi.coherence import groups, separated
 from grimaldi.conventions import Wavelength, parse_wavelengths
 from grimaldi.diffraction import model
+from grimaldi.diffraction.boundary import boundary
 from grimaldi.diffraction.frame import toward
-from grimaldi.diffraction.model import Options, Receivers
+from grimaldi.diffraction.model import Evaluate, Factor, Options, Receivers
+from grimaldi.diffraction.none import none
 from grimaldi.engine.hits import Hits, hits
 from grimaldi.errors import InputError
 from grimaldi.options import checked_options
-from grimaldi.propagate import Wave, propagate
+from grimaldi.propagate import Wave, carrier, factor
 from grimaldi.scene.bodies import indices, vertices
 from grimaldi.scene.model import Mesh, Scene, Source
+
+INTERPOLATED = 0.4  # of the tolerance: what pictures may leave to interpolation of M over the film
 
 
 @dataclass(frozen=True)
@@ -41,6 +46,7 @@ class Settings:
     n: int | str | None = None
     weights: str = "report"
     epsilon: float | None = None
+    fast: bool = True
     coherent: tuple[str, ...] = ()
 
     def check(self) -> None:
@@ -51,16 +57,17 @@ class Settings:
     def options(self) -> Options:
         """The options of the model."""
         return checked_options(
-            self.tolerance, self.precision, self.occlusion, self.n, self.weights, self.epsilon, self.rim
+            self.tolerance, self.precision, self.occlusion, self.n, self.weights, self.epsilon, self.rim, self.fast
         )
 
 
 class Beam(NamedTuple):
-    """One source at one wavelength: its place in `Light.keys`, and U at receivers."""
+    """One source at one wavelength: its place in `Light.keys`, M at receivers, and U from M there."""
 
     source: Source
     key: int
-    wave: Callable[[Receivers], Wave]
+    factor: Evaluate
+    times: Callable[[Receivers, Factor], Wave]
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,6 +78,9 @@ class Light:
     hits: Hits
     beams: tuple[Beam, ...]
     keys: tuple[tuple[float, str], ...]
+    interpolated: float  # of |M_computed - M|, that may be left to interpolation over the film
+
+    asks: bool  # whether the model does more for M than to trace a ray
 
     def select(self, names: tuple[str, ...]) -> list[int]:
         """Where the groups called `names` stand in `keys`, at the first wavelength."""
@@ -80,15 +90,21 @@ class Light:
                 raise InputError(f"wave: groups names {name!r}; the scene has {', '.join(dict.fromkeys(present))}")
         return [present.index(name) for name in names]
 
-    def reflected(self, ray: Any, si: Any, bsdf: Any, n: Any, active: Any) -> Reflected:
-        """Eq. 3a where rays met surfaces: radiance back along them, and U of each key."""
+    def reflected(
+        self, ray: Any, si: Any, bsdf: Any, n: Any, active: Any, known: Sequence[tuple[Factor, Any]] = ()
+    ) -> Reflected:
+        """Eq. 3a where rays met surfaces: radiance back along them, and U of each key.
+
+        known: M of each beam, and where it holds; elsewhere it is asked of the model.
+        """
         p = self.hits.point(ray, si, active)
         context = mi.BSDFContext()
         zero = type(p.x)(0)
         real, imag, error = ([zero] * len(self.keys) for _ in range(3))
         amplitudes = [(mi.UnpolarizedSpectrum(0), mi.UnpolarizedSpectrum(0)) for _ in self.keys]
-        for beam in self.beams:
-            u = beam.wave(Receivers(p, n, active))
+        for beam, found in zip_longest(self.beams, known):
+            receivers = Receivers(p, n, active)
+            u = beam.times(receivers, beam.factor(receivers) if found is None else _unless(*found, beam, receivers))
             wo = si.to_local(toward(beam.source, si.p))
             f = mi.unpolarized_spectrum(bsdf.eval(context, si, wo, active))
             weight = dr.sqrt(dr.maximum(f, 0) * _tint(beam.source))
@@ -101,6 +117,18 @@ class Light:
             real[k], imag[k], error[k] = real[k] + u.real, imag[k] + u.imag, error[k] + u.error
         L = sum((re * re + im * im for re, im in amplitudes), mi.UnpolarizedSpectrum(0))
         return Reflected(L, real, imag, error)
+
+
+@dr.syntax
+def _unless(m: Factor, holds: Any, beam: Beam, receivers: Receivers) -> Factor:
+    """M where it holds, the model's elsewhere."""
+    F = mi.Float64
+    real, imag, error = F(m.real), F(m.imag), F(m.error)
+    asked = receivers.active & ~holds
+    if asked:
+        own = beam.factor(Receivers(receivers.p, receivers.n, asked))
+        real, imag, error = F(own.real), F(own.imag), F(own.error)
+    return Factor(real, imag, error)
 
 
 class Reflected(NamedTuple):
@@ -121,7 +149,7 @@ def prepare(scene: Scene, settings: Settings) -> Light:
         raise InputError(f"{scene.name}: no wavelength; give one, such as wavelength=0.5 in scene units")
     wavelengths = parse_wavelengths(settings.wavelength, settings.scene_unit or scene.unit)
     options = settings.options()
-    factor = model(settings.diffraction)
+    chosen = model(settings.diffraction)
     where = np.concatenate([seen(scene, sensor).points for sensor in scene.mitsuba.sensors()])
     sources = scene.sources if settings.interference else separated(scene.sources)
     keys = tuple((wavelength, group) for wavelength in wavelengths for group in groups(sources))
@@ -129,12 +157,14 @@ def prepare(scene: Scene, settings: Settings) -> Light:
         Beam(
             source,
             keys.index((wavelength, source.group)),
-            propagate(scene, source, factor, 2 * np.pi / wavelength, options, where),
+            factor(scene, source, chosen, 2 * np.pi / wavelength, options, where),
+            carrier(source, 2 * np.pi / wavelength),
         )
         for wavelength in wavelengths
         for source in sources
     )
-    return Light(scene, hits(scene), beams, keys)
+    share = INTERPOLATED * options.tolerance if options.fast and chosen is boundary else 0.0
+    return Light(scene, hits(scene), beams, keys, share, chosen is not none)
 
 
 class LightOf:

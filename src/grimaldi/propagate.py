@@ -13,7 +13,7 @@ from grimaldi.diffraction.boundary import boundary
 from grimaldi.diffraction.curves import phase_allowed
 from grimaldi.diffraction.frame import incident
 from grimaldi.diffraction.fresnel_plane import fresnel_plane, planes
-from grimaldi.diffraction.model import Evaluate, Model, Options, Receivers
+from grimaldi.diffraction.model import Evaluate, Factor, Model, Options, Receivers
 from grimaldi.diffraction.screen import beyond
 from grimaldi.engine.points import Part, at_points
 from grimaldi.outlines.candidate import least_sag
@@ -39,10 +39,15 @@ def propagate(
     k: wavenumber [1/scene unit]; where (n, 3): some of the points where the field will be asked. The function is
     pure and can be traced inside a larger kernel.
     """
+    return _wave(source, k, factor(scene, source, model, k, options, where))
+
+
+def factor(scene: Scene, source: Source, model: Model, k: float, options: Options, where: Reals) -> Evaluate:
+    """M alone, as `propagate` finds it."""
     scene = scene.before(source)
     sags, detour = _sags(scene, source, phase_allowed(scene, options.tolerance) / k, where)
     seen = replace(outline(scene, source, sag=sags), detour=detour)
-    return _wave(source, k, model(scene, source, seen, k, options))
+    return model(scene, source, seen, k, options)
 
 
 def propagate_all(
@@ -58,9 +63,9 @@ def propagate_all(
         before = scene.before(source)
         for group in planes(before, source, points):
             p = points[group.which]
-            factor = fresnel_plane(before, source, k, options, p, group.lattice)
-            if factor is not None:
-                (part,) = at_points(_wave(source, k, factor), scene, source, p, block=len(p))
+            evaluate = fresnel_plane(before, source, k, options, p, group.lattice)
+            if evaluate is not None:
+                (part,) = at_points(_wave(source, k, evaluate), scene, source, p, block=len(p))
                 yield part._replace(which=group.which)
                 left[group.which] = False
     if left.all():
@@ -72,19 +77,24 @@ def propagate_all(
             yield part._replace(which=rest[part.which])
 
 
-def _wave(source: Source, k: float, factor: Evaluate) -> Callable[[Receivers], Wave]:
+def _wave(source: Source, k: float, evaluate: Evaluate) -> Callable[[Receivers], Wave]:
+    times = carrier(source, k)
+    return lambda receivers: times(receivers, evaluate(receivers))
+
+
+def carrier(source: Source, k: float) -> Callable[[Receivers, Factor], Wave]:
+    """What makes U of M: U0 at receivers, times it."""
     ahead = None if source.aperture is None else beyond(source.aperture, source)
 
-    def wave(receivers: Receivers) -> Wave:
+    def times(receivers: Receivers, m: Factor) -> Wave:
         modulus, cos, sin = incident(source, receivers.p, k)
         if ahead is not None:
             modulus = dr.select(ahead(receivers.p), modulus, 0)
-        m = factor(receivers)
         F = type(modulus)
         re, im = F(m.real), F(m.imag)
         return Wave(modulus * (cos * re - sin * im), modulus * (cos * im + sin * re), modulus * F(m.error), modulus)
 
-    return wave
+    return times
 
 
 def _sags(scene: Scene, source: Source, path: float, where: Reals) -> tuple[list[float], float]:

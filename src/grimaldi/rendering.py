@@ -40,6 +40,7 @@ def render(
     n: int | Literal["nyquist"] | None = None,
     weights: Literal["report", "length", "kernel"] | None = None,
     epsilon: float | None = None,
+    fast: bool | None = None,
     max_depth: int | None = None,
     smooth: int = 0,
     **unknown: Any,
@@ -57,6 +58,8 @@ def render(
         spp: samples a pixel.
         seed: of the random numbers.
         size: (width, height) in pixels.
+        fast: whether M may be interpolated over the film, within the tolerance (default: true); if not, it is asked
+            for at every sample.
         max_depth: longest path from the camera; 2 is direct light, -1 no limit.
 
     Returns:
@@ -71,7 +74,7 @@ def render(
         GrimaldiWarning: fringes finer than a pixel; emitters and shapes that do not diffract yet.
     """
     from grimaldi.engine.progress import progress
-    from grimaldi.engine.tiles import render_tile, tiles
+    from grimaldi.engine.tiles import bands, render_tile, tiles
     from grimaldi.fringes import warn_of_fine_fringes
     from grimaldi.light import prepare
     from grimaldi.scene import load
@@ -96,6 +99,7 @@ def render(
         "n": n,
         "weights": weights,
         "epsilon": epsilon,
+        "fast": fast,
     }
     settings = replace(_settings(own), **{name: value for name, value in asked.items() if value is not None})
     settings.check()
@@ -109,9 +113,10 @@ def render(
         warn_of_fine_fringes(loaded, sensor, [wavelength for wavelength, _ in light.keys])
         done: list[Tile] = []
         with progress(shot.width * shot.height, "render") as advance:
-            for first, pixels in tiles(shot):
-                done.append(render_tile(light, sensor, shot, first, pixels))
-                advance(pixels)
+            for band in bands(light, sensor, shot):
+                for first, pixels in tiles(light, shot, band):
+                    done.append(render_tile(light, sensor, shot, first, pixels, band))
+                    advance(pixels)
     return _dataset(loaded, light, settings, shot, done)
 
 

@@ -38,8 +38,8 @@ def trace(
     """Follow rays through a scene to at most `max_depth` segments (-1: no limit).
 
     Ordinary emitters are sampled one at a time and weighted against BSDF sampling, as in Mitsuba; the diffracting
-    ones are all summed at each vertex by `reflected` (`Light.reflected`, of `keys` keys), since their fields may
-    interfere.
+    ones are all summed at each vertex by `reflected` (`Light.reflected` of `keys` keys, told also which rays are the
+    camera's own), since their fields may interfere.
     """
     ordinary = ordinary_emitters(scene)
     limit = 0xFFFFFFFF if max_depth < 0 else max_depth
@@ -76,12 +76,13 @@ def trace(
 
         valid |= active & si.is_valid() | (emits & (depth == 0))
         active &= si.is_valid() & (depth + 1 < limit)
+        goes_on = mi.Bool(len(ordinary) > 0) | (depth + 2 < limit)  # the last segment meets emitters or nothing
         scatters = active & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
 
         # ---------------------- Diffracting sources ----------------------
         if scatters:
             n = mi.Vector3f(dr.mulsign(si.n, -dr.dot(si.n, ray.d)))
-            out = reflected(ray, si, bsdf, n, scatters)
+            out = reflected(ray, si, bsdf, n, scatters, depth == 0)
             L += beta * out.L
             first = scatters & ~seen
             real = _where(first, out.real, real)
@@ -104,7 +105,7 @@ def trace(
 
         # ---------------------- Stopping ----------------------
         strongest = dr.max(mi.unpolarized_spectrum(beta))
-        active &= strongest != 0
+        active &= goes_on & (strongest != 0)
         if dr.hint(limit > rr_depth, mode="scalar"):
             survival = dr.minimum(strongest * eta * eta, 0.95)
             roulette = depth >= rr_depth

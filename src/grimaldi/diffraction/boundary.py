@@ -75,12 +75,12 @@ def _in_either(single: Evaluate, double: Evaluate, tolerance: float, receivers: 
     """Float32 first, and Float64 where that is not within the tolerance."""
     F = types(double=True).Float
     m = single(receivers)
-    real, imag, error = F(m.real), F(m.imag), F(m.error)
+    real, imag, error, clearance = F(m.real), F(m.imag), F(m.error), F(m.clearance)
     again = receivers.active & (error > tolerance)
     if again:
         finer = double(Receivers(receivers.p, receivers.n, again))
         real, imag, error = F(finer.real), F(finer.imag), F(finer.error)
-    return Factor(real, imag, error)
+    return Factor(real, imag, error, clearance)
 
 
 def _factor(
@@ -90,7 +90,7 @@ def _factor(
     scale = sign / (2 * np.pi)
     tails = dr.sqrt(sums.err_real * sums.err_real + sums.err_imag * sums.err_imag) / np.pi
     error = tails + sums.unasked + dr.sqrt(sums.rounding2) / np.pi + (rule.share + _rounding(tab, fr, k, margins))
-    return Factor(geometric + scale * sums.real, scale * sums.imag, error)
+    return Factor(geometric + scale * sums.real, scale * sums.imag, error, dr.sqrt(margins.ray2))
 
 
 def _rounding(tab: Table, fr: Frame, k: float, margins: Margins) -> Any:
@@ -121,7 +121,9 @@ def _planar(problem: Problem, precision: Types) -> Evaluate:
         sums, n, margins = planar_sum(fr, tab, tab.device(k), rule, shaded)
         geometric, sign = (n, -1) if screen.hole else (1 - n, 1)
         m = _factor(tab, rule, fr, k, margins, geometric, sign, sums)
-        return Factor(dr.select(shaded, m.real, 1), dr.select(shaded, m.imag, 0), dr.select(shaded, m.error, 0))
+        return Factor(
+            dr.select(shaded, m.real, 1), dr.select(shaded, m.imag, 0), dr.select(shaded, m.error, 0), m.clearance
+        )
 
     return evaluate
 

@@ -12,13 +12,16 @@ import mitsuba as mi
 import numpy as np
 
 from grimaldi.diffraction.arrays import on_device
+from grimaldi.diffraction.corners import Corner, between, corner
 from grimaldi.diffraction.creeping import damped
 from grimaldi.diffraction.frame import Frame, constant
 from grimaldi.diffraction.grazing import FAINT, Near, grazed, other_than
 from grimaldi.diffraction.model import Receivers
 from grimaldi.diffraction.occlusion import Rays
-from grimaldi.diffraction.segment import Line, Rule, growth, line, path, segment_wave
+from grimaldi.diffraction.segment import Corners, Line, Rule, Wave, growth, line, path, segment_wave
 from grimaldi.diffraction.table import Piece, Segment, Table
+
+NEVER = Corners(0.0, 0.0, float("inf"))  # for traces where corners are not asked
 
 
 class Sum(NamedTuple):
@@ -63,18 +66,86 @@ def _basis(a: Any) -> tuple[Any, Any]:
     return V(1 + sign * a.x * a.x * c, sign * b, -sign * a.x), V(b, sign + a.y * a.y * c, -a.y)
 
 
-def _turn(frame: Frame, seg: Segment, across: Any, kappa: Any) -> tuple[Any, Any]:
-    """Whether a segment crosses the half-plane that `across` is a quarter turn ahead of, as ±1 or 0, and how far out.
+def _turn(c0: Any, c1: Any, kappa: Any) -> Any:
+    """Whether a segment crosses the half-plane from which its corners are c0 and c1 ahead, as ±1 or 0.
 
     Summed over a closed loop this is (1/2π)∮dφ. The side of the ray comes from κ's sign bit, as in the boundary
     wave itself: on the edge, where κ is 0, both must take the same side.
     """
-    c0 = dr.dot(seg.X0 - frame.foot, across)
-    c1 = dr.dot(seg.X1 - frame.foot, across)
     one = type(c0)(1)
     ahead = dr.mulsign(one, c1 - c0)
     crosses = ((c0 > 0) != (c1 > 0)) & (ahead == dr.mulsign(one, kappa))
-    return dr.select(crosses, ahead, 0), dr.abs(kappa) * seg.length / dr.abs(c1 - c0)
+    return dr.select(crosses, ahead, 0)
+
+
+def _ahead(frame: Frame, seg: Segment, across: Any) -> tuple[Any, Any]:
+    """How far a segment's corners are ahead of the half-plane that `across` is a quarter turn ahead of."""
+    return dr.dot(seg.X0 - frame.foot, across), dr.dot(seg.X1 - frame.foot, across)
+
+
+class Chain(NamedTuple):
+    """What a few neighbouring segments send, and where the ray S→P passes them, n as in `planar_count`."""
+
+    wave: Wave
+    distance2: Any
+    segment: Any
+    receiver2: Any
+    n: Any
+
+
+class Passed(NamedTuple):
+    """What a chain's wave is multiplied by on its way X→P: whether it reaches P, and eq. 11's factor, by sgn κ."""
+
+    visible: Any
+    real: Any
+    imag: Any
+
+
+@dr.syntax
+def chain_wave(
+    fr: Frame, tab: Table, first: Any, end: Any, k: Any, rule: Rule, passed: Passed | None, smooth: bool, active: Any
+) -> Chain:
+    """Σ ∫ C e^{ikΔ} dφ over the segments first..end, neighbours of one another; each corner is looked at once."""
+    F = tab.types.Float
+    U = dr.uint32_array_t(F)
+    by_corners = rule.corners is not None and not smooth
+    real, imag, err_real, err_imag, rounding2 = F(0), F(0), F(0), F(0), F(0)
+    distance2, segment, receiver2, n = F(dr.inf), U(first), F(dr.inf), F(0)
+    _, across = _basis(fr.a)
+    j = U(first)
+    last = tuple(corner(fr, tab.corner(j), k))  # a plain tuple: what Dr.Jit can carry from turn to turn
+    while active & (j < end):
+        seg = tab.segment(j)
+        a, b = Corner(*last), corner(fr, seg.X1, k)
+        ends = between(fr, a, b, seg.e, seg.length, k, rule.corners or NEVER)
+        wave = ends.real, ends.imag, F(0), F(0), F(0)
+        d2 = dr.minimum(a.on_ray2, b.on_ray2)
+        p2 = dr.minimum(a.to_p2, b.to_p2)
+        kappa = F(ends.kappa)
+        whole = active & ~ends.serves
+        if dr.hint(not by_corners, mode="scalar"):
+            whole = dr.mask_t(F)(active)
+        if whole:
+            ln = line(fr, seg.X0, seg.e)
+            full = segment_wave(fr, ln, seg.length, k, rule, whole)
+            if dr.hint(smooth, mode="scalar"):
+                full = damped(full, fr, ln, seg.length, seg.radius, k)
+            wave = tuple(full)
+            d2, p2, kappa = closest(fr, seg, ln), to_receiver(fr, seg, ln), ln.kappa
+        n += _turn(dr.dot(a.q, across), dr.dot(b.q, across), kappa)
+        if dr.hint(passed is not None, mode="scalar"):
+            assert passed is not None
+            wave = Wave(*wave).times(
+                dr.select(passed.visible, 1, 0) + dr.mulsign(passed.real, kappa), dr.mulsign(passed.imag, kappa)
+            )
+        real, imag, err_real = real + wave[0], imag + wave[1], err_real + wave[2]
+        err_imag, rounding2 = err_imag + wave[3], rounding2 + wave[4]
+        segment = dr.select(d2 < distance2, j, segment)
+        distance2 = dr.minimum(distance2, d2)
+        receiver2 = dr.minimum(receiver2, p2)
+        last = tuple(b)
+        j += 1
+    return Chain(Wave(real, imag, err_real, err_imag, rounding2), distance2, segment, receiver2, n)
 
 
 # ---------------------------------------------------------------- planar holes and masks
@@ -84,21 +155,19 @@ def _turn(frame: Frame, seg: Segment, across: Any, kappa: Any) -> tuple[Any, Any
 def planar_sum(fr: Frame, tab: Table, k: Any, rule: Rule, active: Any) -> tuple[Sum, Any, Margins]:
     """The sum over whole planar loops, nothing in between, and n = (1/2π)∮dφ as an exact count."""
     F = tab.types.Float
+    U = dr.uint32_array_t(F)
     real, imag, err_real, err_imag = F(0), F(0), F(0), F(0)
     ray2, receiver2, rounding2 = F(dr.inf), F(dr.inf), F(0)
-    n, j = F(0), dr.uint32_array_t(F)(0)
-    _, across = _basis(fr.a)
-    while active & (j < tab.size):
-        seg = tab.segment(j)
-        ln = line(fr, seg.X0, seg.e)
-        wave = segment_wave(fr, ln, seg.length, k, rule, active)
-        n += _turn(fr, seg, across, ln.kappa)[0]
-        real, imag = real + wave.real, imag + wave.imag
-        err_real, err_imag = err_real + wave.err_real, err_imag + wave.err_imag
-        rounding2 += wave.rounding2
-        ray2 = dr.minimum(ray2, closest(fr, seg, ln))
-        receiver2 = dr.minimum(receiver2, to_receiver(fr, seg, ln))
-        j += 1
+    n, i = F(0), U(0)
+    while active & (i < tab.n_pieces):
+        chain = chain_wave(fr, tab, tab.first(i), tab.first(i + 1), k, rule, None, False, active)
+        n += chain.n
+        real, imag = real + chain.wave.real, imag + chain.wave.imag
+        err_real, err_imag = err_real + chain.wave.err_real, err_imag + chain.wave.err_imag
+        rounding2 += chain.wave.rounding2
+        ray2 = dr.minimum(ray2, chain.distance2)
+        receiver2 = dr.minimum(receiver2, chain.receiver2)
+        i += 1
     return Sum(real, imag, err_real, err_imag, rounding2, F(0)), n, Margins(ray2, receiver2)
 
 
@@ -110,7 +179,7 @@ def planar_count(fr: Frame, tab: Table, active: Any) -> Any:
     _, across = _basis(fr.a)
     while active & (j < tab.size):
         seg = tab.segment(j)
-        n += _turn(fr, seg, across, line(fr, seg.X0, seg.e).kappa)[0]
+        n += _turn(*_ahead(fr, seg, across), line(fr, seg.X0, seg.e).kappa)
         j += 1
     return n
 
@@ -202,27 +271,16 @@ def body_sum(
                 if close:
                     past_real, past_imag = grazed(fr, beside.silhouettes, piece, body, visible, k, close)
             acts = visible | (past_real != 0) | (past_imag != 0)
-        j = U(piece.first)
-        while acts & (j < piece.end):
-            seg = tab.segment(j)
-            ln = line(fr, seg.X0, seg.e)
-            wave = segment_wave(fr, ln, seg.length, k, rule, acts)
-            if dr.hint(smooth, mode="scalar"):
-                wave = damped(wave, fr, ln, seg.length, seg.radius, k)
-            if dr.hint(beside is not None, mode="scalar"):
-                wave = wave.times(
-                    dr.select(visible, 1, 0) + dr.mulsign(past_real, ln.kappa), dr.mulsign(past_imag, ln.kappa)
-                )
-            real, imag = real + wave.real, imag + wave.imag
-            err_real, err_imag = err_real + wave.err_real, err_imag + wave.err_imag
-            rounding2 += wave.rounding2
-            receiver2 = dr.minimum(receiver2, to_receiver(fr, seg, ln))
-            d2 = closest(fr, seg, ln)
-            closer = visible & (d2 < nearest2)
-            nearest2 = dr.select(closer, d2, nearest2)
-            nearest_segment = dr.select(closer, j, nearest_segment)
-            nearest_piece = dr.select(closer, i, nearest_piece)
-            j += 1
+        passed = Passed(visible, past_real, past_imag) if beside is not None else None
+        chain = chain_wave(fr, tab, piece.first, piece.end, k, rule, passed, smooth, acts)
+        real, imag = real + chain.wave.real, imag + chain.wave.imag
+        err_real, err_imag = err_real + chain.wave.err_real, err_imag + chain.wave.err_imag
+        rounding2 += chain.wave.rounding2
+        receiver2 = dr.minimum(receiver2, chain.receiver2)
+        closer = visible & (chain.distance2 < nearest2)
+        nearest2 = dr.select(closer, chain.distance2, nearest2)
+        nearest_segment = dr.select(closer, chain.segment, nearest_segment)
+        nearest_piece = dr.select(closer, i, nearest_piece)
         i += 1
     nearest = Nearest(nearest2, nearest_segment, nearest_piece)
     return Sum(real, imag, err_real, err_imag, rounding2, unasked), nearest, Margins(nearest2, receiver2)
@@ -246,7 +304,9 @@ def _crossings(fr: Frame, tab: Table, bend: Any, n: Any, active: Any) -> Any:
         while acts & (j < piece.end):
             seg = tab.segment(j)
             ln = line(fr, seg.X0, seg.e)
-            turn, out = _turn(fr, seg, across, ln.kappa)
+            c0, c1 = _ahead(fr, seg, across)
+            turn = _turn(c0, c1, ln.kappa)
+            out = dr.abs(ln.kappa) * seg.length / dr.abs(c1 - c0)
             z = ln.h + ln.ea * dr.clip(ln.td, 0, seg.length)
             # the bent way is a triangle over the ray, `height` high where it bends
             top = (fr.z2 - z) / (fr.z2 - along)

@@ -24,7 +24,8 @@ class Options:
     occlusion: how bodies block the way from an outline to a point: as knife edges where it grazes them, by yes or
     no, or not at all; "graded" is `boundary`'s alone, the other models take it for "binary";
     rim: "sharp", black screens, or "smooth", waves that creep round smooth bodies (`boundary` alone);
-    fast: whether `field` may take one transform for all points of a plane behind holes or masks.
+    fast: whether `field` may take one transform for all points of a plane behind holes or masks, and `render` may
+    interpolate M over the film.
 
     Of the models that sum over sources: n is how many an edge (`huygens`; "nyquist": λ/2 apart) or a point
     (`area`) gets, None for the model's own choice; `huygens` has `weights`, and the distance epsilon [scene units]
@@ -50,11 +51,15 @@ class Receivers(NamedTuple):
 
 
 class Factor(NamedTuple):
-    """M = U/U0 at the receivers and the estimated |M_computed - M|."""
+    """M = U/U0 at the receivers, the estimated |M_computed - M|, and how near the ray passes an outline.
+
+    `clearance` [scene units] is 0 where a model does not tell.
+    """
 
     real: Any
     imag: Any
     error: Any
+    clearance: Any = 0
 
 
 Evaluate = Callable[[Receivers], Factor]

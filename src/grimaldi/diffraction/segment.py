@@ -22,12 +22,30 @@ import numpy as np
 from grimaldi.diffraction.frame import Frame
 
 
+class Corners(NamedTuple):
+    """Which segments need no more than their corners (`corners.between`).
+
+    Short ones, along which kΔ bends by less than `bend` and whose length² is below `near2` of the distance² of the
+    ray; and far ones, with more than `far` to the next stationary point, in units of kΔ.
+    """
+
+    bend: float
+    near2: float
+    far: float
+
+    @staticmethod
+    def of(tolerance: float) -> Corners:
+        """What leaves a segment within a tenth of its share (benchmarks/segment_rules.py)."""
+        root = tolerance**0.5
+        return Corners(2.5 * root, 0.36 * root, 2 / root)
+
+
 class Rule(NamedTuple):
     """How finely a segment is integrated for a tolerance.
 
     Up to Y = K by panels of width `stretch` in v with `nodes`, `weights` on 0..1, up to v = `cut`, beyond which nothing
     is left; beyond K by `tail_nodes`, `tail_weights` on 0..∞, to the relative error `tail_error` at K or less. `share`
-    is the error that panels may add to M.
+    is the error that panels may add to M. `corners` is None where no segment is left to its corners.
     """
 
     K: float
@@ -39,6 +57,7 @@ class Rule(NamedTuple):
     tail_error: float
     cut: float
     share: float
+    corners: Corners | None
 
     @staticmethod
     def of(tolerance: float) -> Rule:
@@ -57,6 +76,7 @@ class Rule(NamedTuple):
             error,
             float(np.log(100 / tolerance)),
             share,
+            Corners.of(tolerance) if tolerance >= 5e-7 else None,
         )
 
 

@@ -61,6 +61,15 @@ class Table(NamedTuple):
         a, b, c = (dr.gather(P, self.segments, 3 * i + j) for j in range(3))
         return Segment(V(a.x, a.y, a.z), V(b.x, b.y, b.z), V(c.x, c.y, c.z), a.w, c.w)
 
+    def corner(self, i: Any) -> Any:
+        """Where a segment begins."""
+        a = dr.gather(self.types.Packet, self.segments, 3 * i)
+        return self.types.Vector(a.x, a.y, a.z)
+
+    def first(self, i: Any) -> Any:
+        """First segment of a piece."""
+        return dr.gather(type(self.ranges), self.ranges, i)
+
     def piece(self, i: Any) -> Piece:
         P, V = self.types.Packet, self.types.Vector
         a, b, c, d = (dr.gather(P, self.pieces, 4 * i + j) for j in range(4))

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import drjit as dr
@@ -15,12 +16,16 @@ import mitsuba
 import numpy as np
 from numpy.typing import NDArray
 
-from grimaldi.light import Light
+from grimaldi.diffraction.model import Factor, Receivers
+from grimaldi.engine.lattice import LARGEST, Lattice, Nodes, lattice
+from grimaldi.light import Beam, Light, Reflected
 from grimaldi.tracing import trace
 
 mi: Any = mitsuba  # the stubs refuse numbers where arrays are asked for
 
-RAYS = 1 << 16  # of a tile: about a second of work
+ASKED = 1 << 16  # rays of a tile at whose ends the model is asked for M: about a second of work
+RAYS = 1 << 21  # of a tile in all: some hundred bytes each
+NODES = 1 << 23  # of the lattices of M of a band of the film: some twenty bytes each
 
 
 @dataclass
@@ -65,16 +70,58 @@ class Tile:
     lost: int
 
 
-def tiles(shot: Shot) -> Iterator[tuple[int, int]]:
-    """First pixel and number of pixels of each tile."""
-    pixels = shot.width * shot.height
-    step = max(RAYS // shot.spp, 1)
-    for first in range(0, pixels, step):
-        yield first, min(step, pixels - first)
+@dataclass(frozen=True, eq=False)
+class Band:
+    """Some rows of the film, and M over them of each beam, where it is interpolated."""
+
+    top: int
+    rows: int
+    lattices: tuple[Lattice, ...]
 
 
-def render_tile(light: Light, sensor: Any, shot: Shot, first: int, pixels: int) -> Tile:
-    """Trace the samples of `pixels` pixels from `first` on."""
+def bands(light: Light, sensor: Any, shot: Shot) -> Iterator[Band]:
+    """The film from its top on, as many rows at once as memory allows."""
+    if light.interpolated == 0 or sensor.needs_aperture_sample():
+        yield Band(0, shot.height, ())
+        return
+    finest = (
+        1 if shot.spp >= 8 else 2 if shot.spp >= 2 else 4
+    )  # a cell of the finest asks no more than its pixels would
+    row = len(light.beams) * LARGEST * shot.width * (2 / finest) ** 2
+    step = LARGEST * max(int(NODES / row), 1)
+    for top in range(0, shot.height, step):
+        rows = min(step, shot.height - top)
+        nodes = (partial(_nodes, light, beam, sensor, shot) for beam in light.beams)
+        yield Band(top, rows, tuple(lattice(ask, shot.width, top, rows, finest, light.interpolated) for ask in nodes))
+
+
+def tiles(light: Light, shot: Shot, band: Band) -> Iterator[tuple[int, int]]:
+    """First pixel and number of pixels of each tile of a band."""
+    pixels = shot.width * band.rows
+    asked = sum(min(m.unknown / pixels, 1) for m in band.lattices) if band.lattices else float(light.asks)
+    step = int(max(min(RAYS, ASKED / max(asked, 1e-9)) // shot.spp, 1))
+    first = band.top * shot.width
+    for begin in range(0, pixels, step):
+        yield first + begin, min(step, pixels - begin)
+
+
+def _nodes(light: Light, beam: Beam, sensor: Any, shot: Shot, x: Any, y: Any) -> Nodes:
+    """M of a beam at what the camera sees at places of the film [pixels]."""
+    place = mi.Point2f(x, y) / mi.Point2f(dr.opaque(mi.Float, shot.width), dr.opaque(mi.Float, shot.height))
+    ray, _ = sensor.sample_ray_differential(sensor.shutter_open(), 0.5, place, mi.Point2f(0.5))
+    si = light.scene.mitsuba.ray_intersect(ray)
+    lit = si.is_valid() & mi.has_flag(si.bsdf(ray).flags(), mi.BSDFFlags.Smooth)
+    n = mi.Vector3f(dr.mulsign(si.n, -dr.dot(si.n, ray.d)))
+    m = beam.factor(Receivers(light.hits.point(ray, si, lit), n, lit))
+    pixel = mi.Float(0)
+    for o, d in ((ray.o_x, ray.d_x), (ray.o_y, ray.d_y)):
+        pixel = dr.maximum(pixel, dr.norm(o + d * (dr.dot(n, si.p - o) / dr.dot(n, d)) - si.p))
+    shape = dr.select(lit, dr.reinterpret_array(mi.UInt32, si.shape), 0)
+    return Nodes(mi.Float(m.real), mi.Float(m.imag), mi.Float(m.error), si.t, shape, mi.Float(m.clearance) / pixel)
+
+
+def render_tile(light: Light, sensor: Any, shot: Shot, first: int, pixels: int, band: Band | None = None) -> Tile:
+    """Trace the samples of `pixels` pixels from `first` on; without a band M is asked for at every sample."""
     scene = light.scene.mitsuba
     index = dr.arange(mi.UInt32, pixels * shot.spp)
     pixel = dr.opaque(mi.UInt32, first) + index // dr.opaque(mi.UInt32, shot.spp)
@@ -83,19 +130,27 @@ def render_tile(light: Light, sensor: Any, shot: Shot, first: int, pixels: int) 
     stream = Stream(mi.PCG32(initstate=mi.UInt64(identity[0]), initseq=mi.UInt64(identity[1])))
 
     column, row = pixel % dr.opaque(mi.UInt32, shot.width), pixel // dr.opaque(mi.UInt32, shot.width)
-    place = (mi.Point2f(mi.Float(column), mi.Float(row)) + stream.next_2d()) / mi.Point2f(
-        dr.opaque(mi.Float, shot.width), dr.opaque(mi.Float, shot.height)
-    )
+    film = mi.Point2f(mi.Float(column), mi.Float(row)) + stream.next_2d()
+    place = film / mi.Point2f(dr.opaque(mi.Float, shot.width), dr.opaque(mi.Float, shot.height))
     time = sensor.shutter_open()
     if sensor.shutter_open_time() > 0:
         time += stream.next_1d() * sensor.shutter_open_time()
     aperture = stream.next_2d()
     ray, weight = sensor.sample_ray_differential(time, stream.next_1d(), place, aperture)
+
+    def reflected(ray: Any, si: Any, bsdf: Any, n: Any, active: Any, first: Any) -> Reflected:
+        known = []
+        for m in () if band is None else band.lattices:
+            shape: Any = dr.reinterpret_array(mi.UInt32, si.shape)
+            found = m.at(film.x, film.y, si.t, shape, active & first)
+            known.append((Factor(found.real, found.imag, found.error), found.holds))
+        return light.reflected(ray, si, bsdf, n, active, known)
+
     path = trace(
         scene,
         stream,
         ray,
-        light.reflected,
+        reflected,
         len(light.keys),
         shot.max_depth,
         shot.rr_depth,

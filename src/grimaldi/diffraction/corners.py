@@ -1,0 +1,123 @@
+"""A segment's wave from its two corners alone, each shared with a neighbour (THEORY eq. 7): one phase a segment.
+
+Serves where the whole integral is not needed (`segment.segment_wave` has that), by one of two forms:
+
+- short: ψ = kΔ bends by little between the corners, and the ray is several lengths away. With ψ linear and Δφ exact,
+  Filon's rule (Proc. R. Soc. Edinburgh 49, 38 (1928)) gives ∫ C e^{iψ} dφ; what ψ bends by enters to first order;
+- far: ψ runs one way and fast. The ends' leading terms C φ' e^{iψ}/(iψ') are all that is left (stationary phase).
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import drjit as dr
+
+from grimaldi.diffraction.frame import Frame
+from grimaldi.diffraction.segment import Corners, sincos
+
+
+class Corner(NamedTuple):
+    """A point of an outline as a ray S→P sees it."""
+
+    q: Any  # across the ray
+    d2: Any  # |q|²
+    along: Any  # ∇Δ along the ray
+    inv: Any  # 1/r + 1/s: ∇Δ across is q times it
+    C: Any
+    cos: Any  # of ψ = kΔ
+    sin: Any
+    on_ray2: Any  # |q|² between S and P, infinite beyond
+    to_p2: Any  # squared distance of P
+
+
+class Ends(NamedTuple):
+    """The wave between two corners, whether it serves, and κ."""
+
+    real: Any
+    imag: Any
+    serves: Any
+    kappa: Any
+
+
+def corner(frame: Frame, X: Any, k: Any) -> Corner:
+    """The corner X, relative to the outlines' centre, with Δ and its slope free of cancellation."""
+    x = X - frame.foot
+    h = dr.dot(x, frame.a)
+    q = x - h * frame.a
+    d2 = dr.squared_norm(q)
+    z2 = frame.z2 - h
+    to_p2 = dr.fma(z2, z2, d2)
+    inv_s = dr.rsqrt(to_p2)
+    between = z2 > 0
+    delta = _excess(z2, d2, inv_s)
+    along = delta * inv_s
+    if frame.plane:
+        inv, C = inv_s, 0.5 + 0.5 * z2 * inv_s
+    else:
+        z1 = frame.z1 + h
+        between &= z1 > 0
+        inv_r = dr.rsqrt(dr.fma(z1, z1, d2))
+        beyond = _excess(z1, d2, inv_r)
+        delta += beyond
+        along -= beyond * inv_r
+        inv = inv_r + inv_s
+        C = 0.5 + 0.5 * (z1 * z2 - d2) * inv_r * inv_s
+    sin, cos = sincos(k * delta)
+    return Corner(q, d2, along, inv, C, cos, sin, dr.select(between, d2, dr.inf), to_p2)
+
+
+def _excess(z: Any, d2: Any, inv: Any) -> Any:
+    """√(z² + d²) - z, of which `inv` is 1/√(z² + d²)."""
+    reach = dr.rcp(inv) + dr.abs(z)
+    return dr.select(z > 0, d2 / reach, reach)
+
+
+def between(frame: Frame, a: Corner, b: Corner, e: Any, length: Any, k: Any, rule: Corners) -> Ends:
+    """∫ C e^{ikΔ} dφ along e from corner a to b."""
+    kappa = dr.dot(frame.a, dr.cross(a.q, e))
+    ea = dr.dot(e, frame.a)
+    # ψ' at the corners, times the length
+    scale = k * length
+    slope_a = scale * dr.fma(ea, a.along, dr.dot(a.q, e) * a.inv)
+    slope_b = scale * dr.fma(ea, b.along, dr.dot(b.q, e) * b.inv)
+    bend = slope_b - slope_a
+    turn = kappa * length
+
+    # short: Δφ = atan(turn / a·b), shared out so that dφ/dt is in the ratio of 1/d²
+    x = turn / dr.dot(a.q, b.q)
+    x2 = x * x
+    phi = x * (1 - x2 * (1 / 3 - x2 / 5))
+    share = 2 * phi / (a.d2 + b.d2)
+    delta = 0.5 * (slope_a + slope_b)
+    re, im = _filon(delta, dr.fma(a.cos, b.cos, a.sin * b.sin), dr.fma(b.sin, a.cos, -b.cos * a.sin))
+    # -i bend/2 ∫ x(1-x) e^{iδx} dx, about the middle of the phases
+    bent = bend / (24 * dr.square(dr.fma(delta, delta / 40, 1)))
+    im_a, im_b = im - bent, -im - bent
+    near_a, near_b = share * b.d2 * a.C, share * a.d2 * b.C
+    short_real = near_a * (re * a.cos - im_a * a.sin) + near_b * (re * b.cos - im_b * b.sin)
+    short_imag = near_a * (re * a.sin + im_a * a.cos) + near_b * (re * b.sin + im_b * b.cos)
+    is_short = (dr.abs(bend) < rule.bend) & (dr.square(length) < rule.near2 * dr.minimum(a.d2, b.d2))
+
+    # far: i C φ'/ψ' e^{iψ} at a, less the same at b
+    end_a = turn * a.C / (a.d2 * slope_a)
+    end_b = turn * b.C / (b.d2 * slope_b)
+    is_far = (slope_a * slope_b > 0) & (
+        dr.minimum(dr.square(slope_a) / a.inv, dr.square(slope_b) / b.inv) > 2 * rule.far * k * dr.square(length)
+    )
+    return Ends(
+        dr.select(is_short, short_real, end_b * b.sin - end_a * a.sin),
+        dr.select(is_short, short_imag, end_a * a.cos - end_b * b.cos),
+        is_short | is_far,
+        kappa,
+    )
+
+
+def _filon(delta: Any, cos: Any, sin: Any) -> tuple[Any, Any]:
+    """∫ (1-x) e^{iδx} dx over 0..1, given e^{iδ}."""
+    d2 = delta * delta
+    inv = dr.rcp(d2)
+    small = d2 < 0.25
+    re = dr.select(small, 0.5 - d2 * (1 / 24 - d2 / 720), (1 - cos) * inv)
+    im = dr.select(small, delta * (1 / 6 - d2 * (1 / 120 - d2 / 5040)), (delta - sin) * inv)
+    return re, im

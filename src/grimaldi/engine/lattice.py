@@ -1,0 +1,257 @@
+"""M over a picture: at the corners, sides and middles of cells of the film, and between them by quadratics.
+
+M = U/U0 is far smoother than U: what a pinhole camera sees of it takes a node every few pixels, fewer where it
+changes slowly. Cells are halved until what a cell's own nodes say differs by little from what the cell around them
+predicted (Runge's comparison: a quadratic through nodes twice as near errs by an eighth), and where an outline's
+shadow is as near as the next node. Cells lie at fixed places of the film, so that any part of a picture has the
+same nodes as the whole.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import drjit as dr
+import mitsuba
+
+mi: Any = mitsuba  # the stubs refuse numbers where arrays are asked for
+
+LARGEST = 16  # pixels across the largest cells
+HALVED = 0.25  # what halving a cell leaves of a quadratic's error, at most
+STRAIGHT = 0.5  # what a quadratic leaves of a bilinear function's error, at most
+DEPTH = 1e-4  # of the distance from the camera, that a surface may lie off the cell's
+
+
+class Nodes(NamedTuple):
+    """M and its error at places of the film, how far the camera's ray went, and which surface it met (0: none lit).
+
+    `clearance` is the way to the nearest outline's shadow, in pixels as they lie on the surface.
+    """
+
+    real: Any
+    imag: Any
+    error: Any
+    distance: Any
+    shape: Any
+    clearance: Any
+
+
+Evaluate = Callable[[Any, Any], Nodes]
+"""evaluate(x, y): nodes at places of the film [pixels], Float32 arrays."""
+
+
+class Known(NamedTuple):
+    """M between nodes, its error, and where it holds."""
+
+    real: Any
+    imag: Any
+    error: Any
+    holds: Any
+
+
+@dataclass(frozen=True, eq=False)
+class Lattice:
+    """The cells of some rows of a film, and what their nodes say."""
+
+    grid: _Grid
+    nodes: Any  # packets: M's real and imaginary part, distance, clearance
+    size: Any  # of a pixel's cell in pixels, 0 where M is not known
+    shape: Any  # what the cell shows
+    error: Any
+    unknown: int  # pixels without a cell
+
+    def at(self, x: Any, y: Any, distance: Any, shape: Any, active: Any) -> Known:
+        """M where a ray through (x, y) of the film [pixels] met a surface at a distance."""
+        y = y - self.grid.top
+        pixel = mi.UInt32(y) * self.grid.pixels + mi.UInt32(x)
+        size = dr.gather(mi.UInt32, self.size, pixel, active)
+        holds = active & (size > 0)
+        holds &= dr.gather(mi.UInt32, self.shape, pixel, holds) == shape
+        i, j = mi.UInt32(x) & ~(size - 1), mi.UInt32(y) & ~(size - 1)
+        scale = dr.rcp(mi.Float(size))
+        index = [self.grid.node(i, j, size, m, n) for n in range(3) for m in range(3)]
+        values = [dr.gather(mi.Array4f, self.nodes, node, holds) for node in index]
+        found = _sum(values, _quadratic((x - mi.Float(i)) * scale), _quadratic((y - mi.Float(j)) * scale))
+        low, high = mi.Float(dr.inf), mi.Float(0)
+        for v in values:
+            low, high = dr.minimum(low, v.z), dr.maximum(high, v.z)
+        holds &= dr.abs(distance - found.z) <= dr.maximum(DEPTH * distance, 0.25 * (high - low))
+        return Known(found.x, found.y, dr.gather(mi.Float, self.error, pixel, holds), holds)
+
+
+class _Grid(NamedTuple):
+    """Where nodes lie: every half of the finest cell's 2^shift pixels, `columns` in a row; `pixels` in a row."""
+
+    pixels: Any
+    columns: Any
+    shift: int
+    top: Any
+
+    def node(self, x: Any, y: Any, size: Any, m: int, n: int) -> Any:
+        """The index of node (m, n) of 3 × 3 in the cell at pixel (x, y)."""
+        return ((2 * y + n * size) >> self.shift) * self.columns + ((2 * x + m * size) >> self.shift)
+
+
+class _Nodes(NamedTuple):
+    """All nodes' values on the device, and which of them are there."""
+
+    values: Any  # packets: M's real and imaginary part, distance, clearance
+    error: Any
+    shape: Any
+    there: Any
+
+    @staticmethod
+    def empty(n: int) -> _Nodes:
+        return _Nodes(dr.zeros(mi.Float, 4 * n), dr.zeros(mi.Float, n), dr.zeros(mi.UInt32, n), dr.zeros(mi.Bool, n))
+
+
+class _Level(NamedTuple):
+    """Cells of one size: which of the film's serve, and with what error."""
+
+    size: int
+    serves: Any
+    error: Any
+
+
+def lattice(evaluate: Evaluate, width: int, top: int, rows: int, finest: int, share: float) -> Lattice:
+    """The lattice of `rows` rows of a film `width` pixels wide, from row `top` on, which `LARGEST` divides.
+
+    Cells are `finest` pixels or more across, a power of two; share: of interpolation in |M_computed - M|.
+    """
+    across, down = -(-width // LARGEST), -(-rows // LARGEST)
+    columns = 2 * across * LARGEST // finest + 1
+    grid = _Grid(
+        dr.opaque(mi.UInt32, across * LARGEST),
+        dr.opaque(mi.UInt32, columns),
+        finest.bit_length() - 1,
+        dr.opaque(mi.Float, top),
+    )
+    nodes = _Nodes.empty(columns * (2 * down * LARGEST // finest + 1))
+    index = dr.arange(mi.UInt32, across * down)
+    x, y = (index % across) * LARGEST, (index // across) * LARGEST
+    levels: list[_Level] = []
+    size = LARGEST
+    while True:
+        _fill(nodes, grid, x, y, size, evaluate)
+        serves, error = _judged(nodes, grid, x, y, size, finest, share)
+        levels.append(_level(size, x, y, across * LARGEST // size, down * LARGEST // size, serves, error))
+        left = dr.compress(~serves)
+        if size == finest or len(left) == 0:
+            break
+        size //= 2
+        x, y = _quarters(dr.gather(mi.UInt32, x, left), dr.gather(mi.UInt32, y, left), size)
+    return _by_pixel(nodes, grid, levels, across * LARGEST, down * LARGEST)
+
+
+def _fill(nodes: _Nodes, grid: _Grid, x: Any, y: Any, size: int, evaluate: Evaluate) -> None:
+    """Ask for M at the nodes of cells that are not there yet."""
+    asked = dr.zeros(mi.Bool, len(nodes.there))
+    for n in range(3):
+        for m in range(3):
+            dr.scatter(asked, mi.Bool(True), grid.node(x, y, size, m, n))
+    index = dr.compress(asked & ~nodes.there)
+    step = 0.5 * (1 << grid.shift)
+    row = index // grid.columns
+    found = evaluate(step * mi.Float(index - row * grid.columns), grid.top + step * mi.Float(row))
+    values = mi.Array4f(found.real, found.imag, found.distance, found.clearance)
+    dr.scatter(nodes.values, values, index)
+    dr.scatter(nodes.error, mi.Float(found.error), index)
+    dr.scatter(nodes.shape, found.shape, index)
+    dr.scatter(nodes.there, mi.Bool(True), index)
+    dr.eval(nodes.values, nodes.error, nodes.shape, nodes.there)
+
+
+def _judged(nodes: _Nodes, grid: _Grid, x: Any, y: Any, size: int, finest: int, share: float) -> tuple[Any, Any]:
+    """Whether cells serve, and the error of M in them."""
+    own = _gathered(nodes, grid, x, y, size)
+    index = [grid.node(x, y, size, m, n) for n in range(3) for m in range(3)]
+    shape = dr.gather(mi.UInt32, nodes.shape, index[0])
+    same, error = shape > 0, mi.Float(0)
+    for i in index:
+        same &= dr.gather(mi.UInt32, nodes.shape, i) == shape
+        error = dr.maximum(error, dr.gather(mi.Float, nodes.error, i))
+    c00, c10, c20, c01, c11, c21, c02, c12, c22 = own
+    bent = [c10 - 0.5 * (c00 + c20), c01 - 0.5 * (c00 + c02), c21 - 0.5 * (c20 + c22), c12 - 0.5 * (c02 + c22)]
+    left = STRAIGHT * _largest([*bent, c11 - 0.25 * (c00 + c20 + c02 + c22)])
+    if size < LARGEST:
+        around = x & ~mi.UInt32(2 * size - 1), y & ~mi.UInt32(2 * size - 1)
+        coarse = _gathered(nodes, grid, *around, 2 * size)
+        predicted = same
+        for i in (grid.node(*around, 2 * size, m, n) for n in range(3) for m in range(3)):
+            predicted &= dr.gather(mi.UInt32, nodes.shape, i) == shape
+        a, b = (mi.Float(c - c0) / (2 * size) for c, c0 in zip((x, y), around, strict=True))
+        columns = [_quadratic(a + 0.25 * m) for m in range(3)]
+        rows = [_quadratic(b + 0.25 * n) for n in range(3)]
+        misses = [own[3 * n + m] - _sum(coarse, columns[m], rows[n]) for n in range(3) for m in range(3)]
+        left = dr.select(predicted, HALVED * _largest(misses), left)
+    serves = same & (left <= dr.opaque(mi.Float, share))
+    if size > finest:
+        clear = mi.Float(dr.inf)
+        for c in own:
+            clear = dr.minimum(clear, c.w)
+        serves &= clear > size
+    error += left
+    dr.eval(serves, error)
+    return serves, error
+
+
+def _gathered(nodes: _Nodes, grid: _Grid, x: Any, y: Any, size: int) -> list[Any]:
+    """The values of cells' nodes, row by row."""
+    return [dr.gather(mi.Array4f, nodes.values, grid.node(x, y, size, m, n)) for n in range(3) for m in range(3)]
+
+
+def _largest(differences: list[Any]) -> Any:
+    """The largest |M| of differences."""
+    most = mi.Float(0)
+    for d in differences:
+        most = dr.maximum(most, d.x * d.x + d.y * d.y)
+    return dr.sqrt(most)
+
+
+def _quadratic(t: Any) -> tuple[Any, Any, Any]:
+    """Weights of the values at 0, 1/2 and 1."""
+    return (1 - t) * (1 - 2 * t), 4 * t * (1 - t), t * (2 * t - 1)
+
+
+def _sum(values: list[Any], columns: tuple[Any, Any, Any], rows: tuple[Any, Any, Any]) -> Any:
+    """What the quadratic through 3 × 3 values is where the weights are those of its columns and rows."""
+    total = mi.Array4f(0)
+    for n, v in enumerate(rows):
+        for m, u in enumerate(columns):
+            total = dr.fma(mi.Array4f(u * v), values[3 * n + m], total)
+    return total
+
+
+def _level(size: int, x: Any, y: Any, across: int, down: int, serves: Any, error: Any) -> _Level:
+    """The cells at pixels (x, y) among all of their size."""
+    place = (y // size) * dr.opaque(mi.UInt32, across) + x // size
+    level = _Level(size, dr.zeros(mi.Bool, across * down), dr.zeros(mi.Float, across * down))
+    dr.scatter(level.serves, serves, place)
+    dr.scatter(level.error, error, place)
+    return level
+
+
+def _quarters(x: Any, y: Any, size: int) -> tuple[Any, Any]:
+    """The four cells, `size` pixels across, of each cell at (x, y)."""
+    part = dr.arange(mi.UInt32, 4 * len(x))
+    of = part >> 2
+    return dr.gather(mi.UInt32, x, of) + (part & 1) * size, dr.gather(mi.UInt32, y, of) + ((part >> 1) & 1) * size
+
+
+def _by_pixel(nodes: _Nodes, grid: _Grid, levels: list[_Level], pixels: int, rows: int) -> Lattice:
+    """Each pixel's cell."""
+    index = dr.arange(mi.UInt32, pixels * rows)
+    y = index // grid.pixels
+    x = index - y * grid.pixels
+    size, error = mi.UInt32(0), mi.Float(0)
+    for level in levels:
+        place = (y // level.size) * (grid.pixels // level.size) + x // level.size
+        serves = dr.gather(mi.Bool, level.serves, place)
+        size = dr.select(serves, level.size, size)
+        error = dr.select(serves, dr.gather(mi.Float, level.error, place), error)
+    first = grid.node(x & ~(size - 1), y & ~(size - 1), size, 0, 0)
+    shape = dr.gather(mi.UInt32, nodes.shape, first, size > 0)
+    dr.eval(size, error, shape)
+    return Lattice(grid, nodes.values, size, shape, error, dr.count(size == 0)[0])
