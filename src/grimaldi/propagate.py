@@ -14,6 +14,7 @@ from grimaldi.diffraction.curves import phase_allowed
 from grimaldi.diffraction.frame import incident
 from grimaldi.diffraction.fresnel_plane import fresnel_plane, planes
 from grimaldi.diffraction.model import Evaluate, Factor, Model, Options, Receivers
+from grimaldi.diffraction.reach import reach
 from grimaldi.diffraction.screen import beyond
 from grimaldi.engine.points import Part, at_points
 from grimaldi.outlines.candidate import least_sag
@@ -47,6 +48,8 @@ def factor(scene: Scene, source: Source, model: Model, k: float, options: Option
     scene = scene.before(source)
     sags, detour = _sags(scene, source, phase_allowed(scene, options.tolerance) / k, where)
     seen = replace(outline(scene, source, sag=sags), detour=detour)
+    if model is boundary:
+        seen = replace(seen, far=reach(scene, source, seen, k, options, where))
     return model(scene, source, seen, k, options)
 
 

@@ -6,6 +6,7 @@ wave is `segment.segment_wave`, the sums over outlines are in `edges`.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import drjit as dr
@@ -29,7 +30,7 @@ from grimaldi.scene.model import Scene, Source
 
 mi: Any = mitsuba  # the stubs refuse numbers where arrays are asked for
 
-UNASKED = 0.5  # of the tolerance: what all pieces whose X→P goes untested may add to M, each the same
+UNASKED = 0.3  # of the tolerance: what all pieces whose X→P goes untested may add to M
 
 
 class Problem(NamedTuple):
@@ -141,6 +142,20 @@ def _rays_alone(scene: Scene, source: Source) -> Evaluate:
     return evaluate
 
 
+def unoccluded(problem: Problem, precision: Types, far: Any) -> Callable[[Any], tuple[Any, Any]]:
+    """(1/2π) Σ ∫ C e^{ikΔ} dφ (real, imaginary) of bodies at points in free space, of what lies at Δ < far alone."""
+    tab = table(problem.outline, problem.source, precision)._replace(far=far)
+    rule = problem.rule()
+
+    def evaluate(p: Any) -> tuple[Any, Any]:
+        receivers = Receivers(p, dr.zeros(mi.Vector3f, dr.width(p)), dr.mask_t(p.x)(True))
+        fr = frame(problem.source, p, tab)
+        sums, _, _ = body_sum(fr, tab, tab.device(problem.k), rule, 0.0, None, None, False, receivers)
+        return sums.real / (2 * np.pi), sums.imag / (2 * np.pi)
+
+    return evaluate
+
+
 def _bodies(problem: Problem, precision: Types) -> Evaluate:
     scene, source, outline, k, options, grazed = problem
     rule = problem.rule()
@@ -155,7 +170,7 @@ def _bodies(problem: Problem, precision: Types) -> Evaluate:
             tab,
             tab.device(k),
             rule,
-            UNASKED * options.tolerance / (dr.width(tab.ranges) - 1),
+            UNASKED * options.tolerance,
             probe if options.occlusion != "none" else None,
             None if grazing is None else near(fr, grazing, tab.device(k), receivers),
             options.rim == "smooth",

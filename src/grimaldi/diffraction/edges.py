@@ -16,12 +16,16 @@ from grimaldi.diffraction.corners import Corner, between, corner
 from grimaldi.diffraction.creeping import damped
 from grimaldi.diffraction.frame import Frame, constant
 from grimaldi.diffraction.grazing import FAINT, Near, grazed, other_than
+from grimaldi.diffraction.hierarchy import least_detour
 from grimaldi.diffraction.model import Receivers
 from grimaldi.diffraction.occlusion import Rays
 from grimaldi.diffraction.segment import Corners, Line, Rule, Wave, growth, line, path, segment_wave
 from grimaldi.diffraction.table import Piece, Segment, Table
 
 NEVER = Corners(0.0, 0.0, float("inf"))  # for traces where corners are not asked
+
+
+STEPS = 10  # halvings between the largest and the smallest wave's end that may go unasked
 
 
 class Sum(NamedTuple):
@@ -202,15 +206,54 @@ def sounds(fr: Frame, piece: Piece, n: Any) -> Any:
     return above & behind
 
 
-def _cut_off(fr: Frame, piece: Piece, e: Any, k: Any) -> Any:
+def _cut_off(fr: Frame, piece: Piece, k: Any) -> Any:
     """|M| that the chain's wave, cut off somewhere on this piece, would at most leave.
 
     The end of a chain sends |M| = √D / (4π (D + w) √w), D = kΔs at the stationary point, w = k(Δ - Δs).
     """
-    st = path(fr, line(fr, piece.middle, e), k)
+    st = path(fr, line(fr, piece.middle, piece.e), k)
     D = dr.maximum(st.A, 0.01)
     w = dr.maximum(growth(fr, st, dr.copysign(dr.maximum(dr.abs(st.t) - piece.reach, 0), -st.t), k), 0.1)
     return dr.sqrt(D) / (4 * np.pi * (D + w) * dr.sqrt(w))
+
+
+def visit(fr: Frame, tab: Table, i: Any) -> tuple[Any, Any, Any]:
+    """The piece at a node of the table's tree, whether there is one that counts, and whether to go into the node."""
+    inside = least_detour(fr, *tab.tree.node(i)) <= tab.far
+    item, leaf = tab.tree.leaf(i)
+    return item, inside & leaf, inside
+
+
+def _taper(fr: Frame, tab: Table, piece: Piece) -> Any:
+    """1 near the ray, going smoothly to 0 where Δ is `far`: a sharp end would send a wave of its own."""
+    t = dr.clip(2 - 2 * dr.maximum(least_detour(fr, piece.middle, 0), 0) / tab.far, 0, 1)
+    return t * t * (3 - 2 * t)
+
+
+def _binned(sums: list[Any], left: Any, budget: float) -> list[Any]:
+    return [x + dr.select(left <= budget * 2.0**-j, left, 0) for j, x in enumerate(sums)]
+
+
+@dr.syntax
+def faint(fr: Frame, tab: Table, n: Any, k: Any, budget: float, active: Any) -> Any:
+    """The largest |M| of a wave's end that goes unasked, so that all of them add up to `budget` at most.
+
+    It is sought among budget/2^i; at the last of them, budget/pieces, all may go unasked.
+    """
+    F = tab.types.Float
+    share = dr.maximum(F(budget) / F(tab.n_pieces), budget * 2.0**-STEPS)
+    sums = [F(0) for _ in range(STEPS)]
+    i = dr.uint32_array_t(F)(0)
+    while active & (i < tab.tree.size):
+        item, leaf, inside = visit(fr, tab, i)
+        if active & leaf:
+            piece = tab.piece(item)
+            left = dr.select(sounds(fr, piece, n), _cut_off(fr, piece, k), 0)
+            sums = _binned(sums, left, budget)
+        i = tab.tree.after(i, inside)
+    for j in range(STEPS - 1, -1, -1):
+        share = dr.select(sums[j] <= budget, dr.maximum(share, budget * 2.0**-j), share)
+    return share
 
 
 def closest(fr: Frame, seg: Segment, ln: Line) -> Any:
@@ -229,7 +272,7 @@ def body_sum(
     tab: Table,
     k: Any,
     rule: Rule,
-    share: float,
+    budget: float,
     probe: Rays | None,
     beside: Near | None,
     smooth: bool,
@@ -237,7 +280,7 @@ def body_sum(
 ) -> tuple[Sum, Nearest, Margins]:
     """The sum over the outlines of bodies, piece by piece, each as far as it reaches the receiver.
 
-    What would add less than `share` of M goes unasked; without a probe all does. Without silhouettes
+    Waves of `budget` in all go unasked; without a probe all do. Without silhouettes
     near by a piece reaches the receiver or does not. `smooth` rims are those with a radius.
     """
     F = tab.types.Float
@@ -247,18 +290,20 @@ def body_sum(
     if dr.hint(probe is not None, mode="scalar"):
         assert probe is not None
         p = p + probe.epsilon(p) * receivers.n  # off its own surface
+        share = faint(fr, tab, n, k, budget, receivers.active)
     real, imag, err_real, err_imag = F(0), F(0), F(0), F(0)
     nearest2, nearest_segment, nearest_piece = F(dr.inf), U(0), U(0)
     receiver2, rounding2, unasked = F(dr.inf), F(0), F(0)
     i = U(0)
-    while receivers.active & (i < tab.n_pieces):
-        piece = tab.piece(i)
-        acts = sounds(fr, piece, n)
+    while receivers.active & (i < tab.tree.size):
+        item, leaf, inside = visit(fr, tab, i)
+        piece = tab.piece(dr.select(leaf, item, 0))
+        acts = leaf & sounds(fr, piece, n)
         visible = dr.mask_t(F)(acts)
         past_real, past_imag = F(0), F(0)
         if dr.hint(probe is not None, mode="scalar"):
             assert probe is not None
-            left = _cut_off(fr, piece, tab.segment(piece.first).e, k)
+            left = _cut_off(fr, piece, k)
             tested = acts & (left > share)
             unasked += dr.select(acts & ~tested, left, 0)
             if tested:
@@ -273,15 +318,16 @@ def body_sum(
             acts = visible | (past_real != 0) | (past_imag != 0)
         passed = Passed(visible, past_real, past_imag) if beside is not None else None
         chain = chain_wave(fr, tab, piece.first, piece.end, k, rule, passed, smooth, acts)
-        real, imag = real + chain.wave.real, imag + chain.wave.imag
+        weight = _taper(fr, tab, piece)
+        real, imag = dr.fma(weight, chain.wave.real, real), dr.fma(weight, chain.wave.imag, imag)
         err_real, err_imag = err_real + chain.wave.err_real, err_imag + chain.wave.err_imag
         rounding2 += chain.wave.rounding2
         receiver2 = dr.minimum(receiver2, chain.receiver2)
         closer = visible & (chain.distance2 < nearest2)
         nearest2 = dr.select(closer, chain.distance2, nearest2)
         nearest_segment = dr.select(closer, chain.segment, nearest_segment)
-        nearest_piece = dr.select(closer, i, nearest_piece)
-        i += 1
+        nearest_piece = dr.select(closer, item, nearest_piece)
+        i = tab.tree.after(i, inside)
     nearest = Nearest(nearest2, nearest_segment, nearest_piece)
     return Sum(real, imag, err_real, err_imag, rounding2, unasked), nearest, Margins(nearest2, receiver2)
 
@@ -297,9 +343,10 @@ def _crossings(fr: Frame, tab: Table, bend: Any, n: Any, active: Any) -> Any:
     height = dr.norm(q)
     across = dr.cross(fr.a, q / height)
     count, i = F(0), U(0)
-    while active & (i < tab.n_pieces):
-        piece = tab.piece(i)
-        acts = sounds(fr, piece, n)
+    while active & (i < tab.tree.size):
+        item, leaf, inside = visit(fr, tab, i)
+        piece = tab.piece(dr.select(leaf, item, 0))
+        acts = leaf & sounds(fr, piece, n)
         j = U(piece.first)
         while acts & (j < piece.end):
             seg = tab.segment(j)
@@ -314,7 +361,7 @@ def _crossings(fr: Frame, tab: Table, bend: Any, n: Any, active: Any) -> Any:
                 top = dr.minimum(top, (fr.z1 + z) / (fr.z1 + along))
             count += dr.select(out < height * dr.minimum(top, 1), turn, 0)
             j += 1
-        i += 1
+        i = tab.tree.after(i, inside)
     return count
 
 

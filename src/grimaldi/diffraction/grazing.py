@@ -22,6 +22,7 @@ import numpy as np
 
 from grimaldi.diffraction.arrays import Types
 from grimaldi.diffraction.frame import Frame
+from grimaldi.diffraction.hierarchy import Tree, least_detour, tree
 from grimaldi.diffraction.knife_edge import amplitude
 from grimaldi.diffraction.model import Receivers
 from grimaldi.diffraction.segment import line, sincos
@@ -29,6 +30,7 @@ from grimaldi.diffraction.table import Piece, cut
 from grimaldi.outlines.model import Outline
 from grimaldi.scene.model import Vector
 
+FEW = 64  # chords, that take no hierarchy
 FAINT = 0.01  # |M| of a wave that is not worth a second edge
 WIDEST = 1 / (np.sqrt(2) * np.pi * FAINT)  # Fresnel parameter beyond which E is fainter
 
@@ -48,7 +50,7 @@ class Chords(NamedTuple):
 
     records: Any
     ranges: Any  # first chord of each body, and their number
-    size: int
+    tree: Tree
     types: Types
 
     def chord(self, i: Any) -> Chord:
@@ -91,7 +93,9 @@ def chords(outline: Outline, centre: Vector, types: Types) -> Chords | None:
     records = np.concatenate([start, of[:, None], (end - start) / length, length, outward, zero], axis=1)[order]
     begin = np.searchsorted(of[order], np.arange(of.max() + 2))
     index = dr.uint32_array_t(types.Float)
-    return Chords(types.buffer(records), index(begin.astype(np.uint32)), len(of), types)
+    middle, half = (0.5 * (start + end))[order], 0.5 * length[order, 0]
+    around = tree(middle, half, types, leaves_only=len(of) < FEW)
+    return Chords(types.buffer(records), index(begin.astype(np.uint32)), around, types)
 
 
 def passing(way: Frame, chord: Chord, k: float) -> Passing:
@@ -118,22 +122,26 @@ def near(fr: Frame, silhouettes: Chords, k: float, receivers: Receivers) -> Near
     p = fr.foot + fr.z2 * fr.a
     everywhere = dr.squared_norm(n) == 0
     body, v2, next_body, next_v2 = F(-1), F(dr.inf), F(-1), F(dr.inf)
-    j = dr.uint32_array_t(F)(0)
-    while receivers.active & (j < silhouettes.size):
-        chord = silhouettes.chord(j)
-        at = passing(fr, chord, k)
-        x = chord.start + at.t * chord.e - p
-        rises = everywhere | (dr.dot(n, x) > 1e-4 * dr.norm(x))
-        v2_j = dr.select(rises, at.v2, dr.inf)
-        other = chord.body != body
-        closest = v2_j < v2
-        moves_down = closest & other
-        second = ~closest & other & (v2_j < next_v2)
-        next_body = dr.select(moves_down, body, dr.select(second, chord.body, next_body))
-        next_v2 = dr.select(moves_down, v2, dr.select(second, v2_j, next_v2))
-        body = dr.select(closest, chord.body, body)
-        v2 = dr.select(closest, v2_j, v2)
-        j += 1
+    far = (0.5 * np.pi * WIDEST * WIDEST) / k  # v² is (2/π) kΔ or less
+    i = dr.uint32_array_t(F)(0)
+    while receivers.active & (i < silhouettes.tree.size):
+        inside = least_detour(fr, *silhouettes.tree.node(i)) <= far
+        item, leaf = silhouettes.tree.leaf(i)
+        if receivers.active & inside & leaf:
+            chord = silhouettes.chord(item)
+            at = passing(fr, chord, k)
+            x = chord.start + at.t * chord.e - p
+            rises = everywhere | (dr.dot(n, x) > 1e-4 * dr.norm(x))
+            v2_j = dr.select(rises, at.v2, dr.inf)
+            other = chord.body != body
+            closest = v2_j < v2
+            moves_down = closest & other
+            second = ~closest & other & (v2_j < next_v2)
+            next_body = dr.select(moves_down, body, dr.select(second, chord.body, next_body))
+            next_v2 = dr.select(moves_down, v2, dr.select(second, v2_j, next_v2))
+            body = dr.select(closest, chord.body, body)
+            v2 = dr.select(closest, v2_j, v2)
+        i = silhouettes.tree.after(i, inside)
     return Near(silhouettes, body, v2, next_body, next_v2)
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from grimaldi.diffraction.arrays import Types, on_device
+from grimaldi.diffraction.hierarchy import Tree, tree
 from grimaldi.diffraction.model import Options
 from grimaldi.outlines.model import Outline
 from grimaldi.scene.model import Source, Vector
@@ -37,6 +38,7 @@ class Piece(NamedTuple):
     closed: Any  # 1 where two faces meet, 0 at the border of a sheet
     outward: Any
     behind: Any  # how far behind it its own body comes next
+    e: Any  # along its first segment
 
 
 class Table(NamedTuple):
@@ -50,6 +52,8 @@ class Table(NamedTuple):
     segments: Any
     ranges: Any
     pieces: Any
+    tree: Tree  # of the pieces
+    far: Any  # what lies at a larger Δ adds nothing
     types: Types
 
     def device(self, number: float) -> Any:
@@ -72,7 +76,7 @@ class Table(NamedTuple):
 
     def piece(self, i: Any) -> Piece:
         P, V = self.types.Packet, self.types.Vector
-        a, b, c, d = (dr.gather(P, self.pieces, 4 * i + j) for j in range(4))
+        a, b, c, d, e = (dr.gather(P, self.pieces, 5 * i + j) for j in range(5))
         index = type(self.ranges)
         return Piece(
             dr.gather(index, self.ranges, i),
@@ -85,6 +89,7 @@ class Table(NamedTuple):
             b.w,
             V(d.x, d.y, d.z),
             d.w,
+            V(e.x, e.y, e.z),
         )
 
 
@@ -144,7 +149,11 @@ def table(
     of = outline.body[middle].astype(float)[:, None]
     behind = np.minimum.reduceat(np.minimum(outline.behind, 1e30), ranges[:-1])[:, None]
     pieces = np.concatenate(
-        [target, reach, normals[:, 0], closed, normals[:, 1], of, outline.outward[middle], behind], 1
+        [
+            *(target, reach, normals[:, 0], closed, normals[:, 1], of, outline.outward[middle], behind),
+            *((X1 - X0)[ranges[:-1]] / length[ranges[:-1]], zero[: len(middle)]),
+        ],
+        1,
     )
     index = dr.uint32_array_t(types.Float)
     return Table(
@@ -156,5 +165,7 @@ def table(
         types.buffer(segments),
         index(ranges.astype(np.uint32)),
         types.buffer(pieces),
+        tree(target, reach[:, 0], types, leaves_only=not np.isfinite(outline.far)),
+        on_device(types.Float, min(outline.far, 1e30)),
         types,
     )

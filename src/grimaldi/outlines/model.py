@@ -32,6 +32,7 @@ class Outline:
     radius: Reals  # (n,) of curvature of the surface along the ray [scene units]; 0 where the rim is sharp
     sag: float = 0.0  # how far a segment may lie from the curve that it stands for [scene units]
     detour: float = 0.0  # how much Δ may err for that where the field is asked [scene units]
+    far: float = float("inf")  # Δ from which on segments add nothing there that the tolerance sees [scene units]
 
     def __len__(self) -> int:
         return len(self.start)
