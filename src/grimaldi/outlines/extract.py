@@ -10,7 +10,9 @@ from grimaldi.outlines import curvature, cylinder, disk, mesh, planar, sphere
 from grimaldi.outlines.candidate import Candidates, toward
 from grimaldi.outlines.chains import chains
 from grimaldi.outlines.hidden import Sight
-from grimaldi.outlines.lit import Stretches, divided, lit_parts
+from grimaldi.outlines.lines import each, ends, straight
+from grimaldi.outlines.lit import Stretches, lit_parts
+from grimaldi.outlines.memory import once
 from grimaldi.outlines.model import Integers, Outline, Reals
 from grimaldi.outlines.pieces import Pieces
 from grimaldi.outlines.soup import Soup
@@ -39,17 +41,26 @@ def outline(scene: Scene, source: Source, *, sag: Sequence[float] | None = None)
     """
     if scene.screen:
         return _planar(scene, source, sag or [DEFAULT_SAG * curve(shape)[1] for shape in scene.screen])
-    sag = sag or default_sags(scene.bodies)
-    soup = Soup.of(scene.bodies)
-    edges, body = edges_of(scene.bodies, soup, source, sag)
+    sag = tuple(sag or default_sags(scene.bodies))
+    return once(scene, ("outline", source, sag), lambda: _bodies(scene, source, sag))
+
+
+def _bodies(scene: Scene, source: Source, sag: Sequence[float]) -> Outline:
+    soup = soup_of(scene)
+    edges, body = edges_of(scene, source, sag)
     if not len(body):
         return Outline.empty()
-    longest = LONGEST * _extents(edges.start, body)
     sight = sight_of(scene.bodies, soup, source, edges, body)
-    lit = divided(lit_parts(sight), edges, longest)
+    lit = lit_parts(sight)
     coarsest = max((s for b, s in zip(scene.bodies, sag, strict=True) if is_curved(b.geometry)), default=0.0)
     radius = curvature.radii(scene.bodies, soup, source, edges, body)
-    return assemble(edges, body, lit, gap_behind(sight, lit), source, coarsest, radius)
+    longest = LONGEST * _extents(edges.start, body)
+    return assemble(edges, body, lit, source, coarsest, radius=radius, longest=longest, sight=sight)
+
+
+def soup_of(scene: Scene) -> Soup:
+    """The triangles of a scene's bodies."""
+    return once(scene, ("soup",), lambda: Soup.of(scene.bodies))
 
 
 def default_sags(bodies: Sequence[Body]) -> list[float]:
@@ -57,11 +68,11 @@ def default_sags(bodies: Sequence[Body]) -> list[float]:
     return [DEFAULT_SAG * curve(body.geometry)[1] if is_curved(body.geometry) else 0.0 for body in bodies]
 
 
-def edges_of(bodies: Sequence[Body], soup: Soup, source: Source, sag: Sequence[float]) -> tuple[Candidates, Integers]:
-    """The silhouette edges of bodies, lit or not, and the body (n,) of each, rising; sag as in `outline`."""
-    edges, body = mesh.silhouettes(soup, source)
+def edges_of(scene: Scene, source: Source, sag: Sequence[float]) -> tuple[Candidates, Integers]:
+    """The silhouette edges of a scene's bodies, lit or not, and the body (n,) of each, rising; sag as in `outline`."""
+    edges, body = once(scene, ("edges", source), lambda: mesh.silhouettes(soup_of(scene), source))
     parts, owner = [edges], [body]
-    for i, (of, s) in enumerate(zip(bodies, sag, strict=True)):
+    for i, (of, s) in enumerate(zip(scene.bodies, sag, strict=True)):
         if not isinstance(of.geometry, Mesh):
             parts.append(_curve(of.geometry, source, s))
             owner.append(np.full(len(parts[-1]), i))
@@ -108,15 +119,6 @@ def _curve(geometry: Sphere | Disk | Cylinder, source: Source, sag: float) -> Ca
     return disk.silhouette(geometry, source, sag)
 
 
-def gap_behind(sight: Sight, lit: Stretches) -> Reals:
-    """For each lit stretch, how far behind its middle its own body comes next; a wall along the ray does not."""
-    c, at = lit.candidate, 0.5 * (lit.low + lit.high)
-    x = sight.edges.at(c, at)
-    span = sight.edges.end[c] - sight.edges.start[c]
-    x += BESIDE * np.abs(x).max(initial=0.0) * _outward(sight.source, x, span)
-    return sight.behind(c, at, x)
-
-
 def _planar(scene: Scene, source: Source, sag: Sequence[float]) -> Outline:
     parts, number = [], []
     for i, (shape, s) in enumerate(zip(scene.screen, sag, strict=True)):
@@ -125,34 +127,53 @@ def _planar(scene: Scene, source: Source, sag: Sequence[float]) -> Outline:
             number.append(np.full(len(loop.start), -1 - i))
     edges = Candidates.concatenate(parts)
     n = len(edges.start)
-    return assemble(edges, np.concatenate(number), Stretches.whole(n), np.full(n, np.inf), source, max(sag))
+    return assemble(edges, np.concatenate(number), Stretches.whole(n), source, max(sag))
 
 
 def assemble(
     edges: Candidates,
     body: Integers,
     lit: Stretches,
-    behind: Reals,
     source: Source,
     sag: float,
+    *,
     radius: Reals | None = None,
+    longest: Reals | None = None,
+    sight: Sight | None = None,
 ) -> Outline:
-    """The lit stretches in the order of their chains; radius as in `Outline`, for each edge."""
-    c = lit.candidate
-    span = edges.end[c] - edges.start[c]
-    start = np.where((lit.low > 0)[:, None], edges.start[c] + lit.low[:, None] * span, edges.start[c])
-    end = np.where((lit.high < 1)[:, None], edges.start[c] + lit.high[:, None] * span, edges.end[c])
-    reach = np.abs(start).max(initial=0.0)
-    some = np.linalg.norm(end - start, axis=1) > 1e-13 * reach  # two cuts can fall on one Float64 place
-    start, end, c, behind = start[some], end[some], c[some], behind[some]
-    order, chain = chains(start, end)
-    start, end, c = start[order], end[order], c[order]
-    interval = np.stack([lit.low, lit.high], axis=1)[some][order]
+    """The lit stretches of n edges in the order of their chains.
+
+    radius (n,) as in `Outline`, else 0; longest (n,): mesh edges that go on in one line become one, and then no
+    segment longer than this, else each stretch is a segment; sight: what tells how far behind its body comes next.
+    """
+    start, end = ends(edges, lit)
+    # two cuts can fall on one Float64 place
+    some = np.linalg.norm(end - start, axis=1) > 1e-13 * np.abs(start).max(initial=0.0)
+    order, chain = chains(start[some], end[some])
+    lit = lit[np.flatnonzero(some)[order]]
+    radius = np.zeros(len(body)) if radius is None else radius
+    lines = each(edges, lit) if longest is None else straight(edges, lit, chain, radius, longest)
+    start, end, c = lines.start, lines.end, lines.candidate
     out = _outward(source, 0.5 * (start + end), end - start)
+    behind = np.full(len(c), np.inf)
+    if sight is not None:
+        x = edges.at(c, lines.middle)
+        behind = sight.behind(
+            c, lines.middle, x + BESIDE * np.abs(x).max(initial=0.0) * _outward(source, x, end - start)
+        )
     outward = np.where((body[c] < 0)[:, None], -out, out)  # a hole's open side is the one its loop encloses
-    radius = np.zeros(len(c)) if radius is None else radius[c]
     return Outline(
-        start, end, body[c], edges.edge[c], interval, edges.normals[c], outward, behind[order], chain, radius, sag
+        start,
+        end,
+        body[c],
+        lines.edge,
+        lines.interval,
+        edges.normals[c],
+        outward,
+        behind,
+        chain[lines.stretch],
+        radius[c],
+        sag,
     )
 
 

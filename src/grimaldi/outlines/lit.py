@@ -133,17 +133,3 @@ def _joined(stretch: Integers, low: Reals, high: Reals) -> tuple[Integers, Reals
     first = np.flatnonzero(np.append(True, ~follows)[: len(order)])
     last = np.append(first[1:], len(order))[: len(first)] - 1
     return stretch[first], low[first], high[last]
-
-
-def divided(parts: Stretches, edges: Candidates, longest: Reals) -> Stretches:
-    """Stretches cut evenly so that none is longer than `longest` (n,) of its candidate."""
-    length = np.linalg.norm(edges.end - edges.start, axis=1)[parts.candidate] * (parts.high - parts.low)
-    pieces = np.maximum(np.ceil(length / longest[parts.candidate]), 1).astype(np.int64)
-    which = np.repeat(np.arange(len(pieces)), pieces)
-    step = np.arange(len(which)) - np.repeat(np.cumsum(pieces) - pieces, pieces)
-    span = (parts.high - parts.low)[which] / pieces[which]
-    low = parts.low[which] + step * span
-    high = np.where(step + 1 == pieces[which], parts.high[which], low + span)
-    # neighbours share their end bit for bit
-    low[1:] = np.where(which[1:] == which[:-1], high[:-1], low[1:])
-    return Stretches(parts.candidate[which], low, high)

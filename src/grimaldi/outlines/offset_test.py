@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from grimaldi.outlines import cylinder, disk
 from grimaldi.outlines.candidate import Candidates, closed_curve, polygon, toward
-from grimaldi.outlines.extract import assemble, curve, gap_behind, sight_of
+from grimaldi.outlines.extract import assemble, curve, sight_of, soup_of
 from grimaldi.outlines.lit import Stretches
 from grimaldi.outlines.mesh import normals_beside
 from grimaldi.outlines.model import Outline, Reals
@@ -37,7 +37,7 @@ def offset_outline(scene: Scene, source: Source, epsilon: float | None = None) -
     of a disk the rim, of a cylinder both rims and its tangent lines, each as about 32 edges, where the source reaches
     their middles.
     """
-    soup = Soup.of(scene.bodies)
+    soup = soup_of(scene)
     parts: list[Candidates] = []
     for number, body in enumerate(scene.bodies):
         geometry = body.geometry
@@ -54,7 +54,7 @@ def offset_outline(scene: Scene, source: Source, epsilon: float | None = None) -
     by_middle = np.flatnonzero(edges.edge < 0)
     dark = by_middle[sight.hidden(by_middle, np.full(len(by_middle), 0.5))]
     whole = Stretches.whole(len(body))[np.delete(np.arange(len(body)), dark)]
-    return assemble(edges, body, whole, gap_behind(sight, whole), source, 0.0)
+    return assemble(edges, body, whole, source, 0.0, sight=sight)
 
 
 def _great_circle(sphere: Sphere, source: Source) -> Candidates:
