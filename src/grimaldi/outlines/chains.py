@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from grimaldi.outlines.model import Integers, Reals
-from grimaldi.outlines.soup import merged_points
+from grimaldi.scene.triangles import merged_points
 
 
 def chains(start: Reals, end: Reals) -> tuple[Integers, Integers]:

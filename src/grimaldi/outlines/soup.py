@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from grimaldi.outlines.model import Integers, Reals
 from grimaldi.scene.model import Body, Mesh
-
-_ODD = (0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9, 0x27D4EB2F165667C5)  # they spread keys evenly
+from grimaldi.scene.triangles import merged_points
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,33 +75,6 @@ class Soup:
         result[odd // max(n, 1)] = True
         result[odd % max(n, 1)] = True
         return result
-
-
-def merged_points(points: Reals, owner: Integers) -> tuple[Integers, Integers]:
-    """Of points (3, n) one of each that are equal in all bits and have the same owner (n,), and which (n,) that is.
-
-    Of -0.0 and 0.0 one only must occur. They are found by a hash; should two different points have the same one, by
-    sorting their coordinates instead.
-    """
-    keys = [*points.view(np.uint64), owner.astype(np.uint64)]
-    hashed = np.zeros(len(owner), np.uint64)
-    for key, odd in zip(keys, _ODD, strict=True):
-        hashed = (hashed ^ key) * np.uint64(odd)
-        hashed ^= hashed >> np.uint64(29)
-    order = np.argsort(hashed)
-    new = hashed[order][1:] != hashed[order][:-1]
-    differ = np.zeros(max(len(owner) - 1, 0), bool)
-    for key in keys:
-        differ |= key[order][1:] != key[order][:-1]
-    if (differ != new).any():
-        order = np.lexsort(keys)
-        new = np.zeros(len(new), bool)
-        for key in keys:
-            new |= key[order][1:] != key[order][:-1]
-    leads = np.append(True, new)[: len(owner)]
-    number = np.empty(len(owner), np.int64)
-    number[order] = np.cumsum(leads) - 1
-    return order[leads], number
 
 
 def grouped(numbers: Integers) -> Iterator[tuple[int, Integers]]:
