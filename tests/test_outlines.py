@@ -286,8 +286,8 @@ def test_runs_keep_every_corner_near_their_chord():
 
 
 def test_runs_keep_ways_back_and_breaks():
-    x = np.array([[0.0, 0, 0], [1, 0, 0], [2, 0, 0], [1, 0, 0], [0, 0, 0]])
-    assert list(runs(x[:-1], x[1:], np.zeros(3, bool), np.full(4, 0.1))) == [0, 2]
+    x = np.array([[0.0, 0, 0], [1, 0, 0], [3, 0, 0], [2, 0, 0]])
+    assert list(runs(x[:-1], x[1:], np.zeros(2, bool), np.full(3, 0.1))) == [0, 2]
     straight = np.arange(6.0)[:, None] * [1, 0, 0]
     assert list(runs(straight[:-1], straight[1:], np.array([False, True, False, False]), np.zeros(5))) == [0, 2]
 
