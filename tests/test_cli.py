@@ -213,3 +213,15 @@ def test_ctrl_c_ends_with_one_line_and_no_file(tmp_path: Path, scene: Path) -> N
     _, errors = running.communicate(timeout=60)
     assert (running.returncode, errors) == (130, "grimaldi: interrupted\n")
     assert sorted(tmp_path.iterdir()) == before
+
+
+def test_a_picture_loads_no_library_that_it_does_not_need(tmp_path: Path) -> None:
+    """Each takes as long to import as the picture to compute."""
+    heavy = ["finufft", "matplotlib", "scipy.spatial", "scipy.special", "shapely", "trimesh"]
+    arguments = ["grimaldi", "render", "young", "--size", "8x8", "--spp", "1", "-o", str(tmp_path / "x.png")]
+    script = (
+        f"import sys\nfrom grimaldi.cli import main\nsys.argv = {arguments}\n"
+        f"try:\n    main()\nfinally:\n    print([name for name in {heavy} if name in sys.modules])\n"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
+    assert (done.returncode, done.stdout) == (0, "[]\n"), done.stderr

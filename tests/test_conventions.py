@@ -6,6 +6,7 @@ import math
 from typing import Any
 
 import numpy as np
+import pint
 import pytest
 
 from grimaldi.conventions import check_options, parse_wavelengths
@@ -87,3 +88,11 @@ def test_a_misspelt_option_names_the_nearest() -> None:
         check_options(["tolerence"], ["n", "precision", "tolerance"])
     with pytest.raises(InputError, match="xyz: no such option; known are n, precision"):
         check_options(["xyz"], ["precision", "n"])
+
+
+@pytest.mark.parametrize("unit", ["m", "mm", "um", "µm", "nm"])
+@pytest.mark.parametrize("scene_unit", ["1 m", "2 mm", "um", "5 nm"])
+def test_usual_units_are_pints(unit, scene_unit):
+    (computed,) = parse_wavelengths(f"0.00053 {unit}", scene_unit)
+    expected = pint.UnitRegistry().convert(0.00053, unit, "m") / pint.Quantity(scene_unit).m_as("m")
+    assert computed == pytest.approx(expected, rel=1e-14)

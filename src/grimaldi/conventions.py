@@ -21,6 +21,8 @@ ModelName = Literal["none", "boundary", "huygens", "area"]
 
 _SHORTEST, _LONGEST = 1e-18, 1e18  # scene units; beyond them phases overflow or divide by zero
 
+_DECIMALS = {"m": 0, "mm": 3, "um": 6, "µm": 6, "μm": 6, "nm": 9}  # the usual units, without pint: a third of a second
+
 # A number, then perhaps one unit's name: pint's own expressions ("2**9**9 nm") are none of our business.
 _QUANTITY = re.compile(r"\s*(?P<number>[-+]?(?:\d[\d_]*\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)?\s*(?P<unit>[^\W\d_]+)?\s*")
 
@@ -126,6 +128,9 @@ def _quantity(name: str, text: str) -> tuple[float | None, str | None]:
 
 
 def _convert(name: str, value: float, unit: str, to: str) -> float:
+    if unit in _DECIMALS and to in _DECIMALS:
+        places = _DECIMALS[to] - _DECIMALS[unit]
+        return value * 10.0**places if places > 0 else value / 10.0**-places  # powers of ten are exact
     import pint
 
     try:

@@ -20,10 +20,10 @@ VIEWS = ("picture", "phase", "phase-cyclic", "phase-intensity")
 
 def write(dataset: xr.Dataset, path: str | Path, view: str, exposure: float | None) -> None:
     """Write one of VIEWS of `dataset` to `path`; see `pixels`."""
-    from matplotlib.image import imsave
+    from PIL import Image
 
     with replacing(path) as temporary:
-        imsave(temporary, pixels(dataset, view, exposure), format="png")
+        Image.fromarray(pixels(dataset, view, exposure)).save(temporary, format="png")
 
 
 def pixels(dataset: xr.Dataset, view: str, exposure: float | None) -> NDArray[np.uint8]:

@@ -17,13 +17,13 @@ EDGE_ON = 1e-6  # rad: what Float32 vertices leave open of a face's direction
 
 @dataclass(frozen=True, eq=False)
 class Candidates:
-    """Straight edges of one body, n of them, oriented as in `Outline`."""
+    """Straight edges, n of them, oriented as in `Outline`."""
 
     start: Reals  # (n, 3)
     end: Reals  # (n, 3)
     normals: Reals  # (n, 2, 3), as in `Outline`
-    edge: Integers  # (n,) the mesh edge, -1 on smooth shapes
-    faces: Integers  # (n, 2) the body's triangles beside the edge: they cannot hide it; -1 where there is none
+    edge: Integers  # (n,) as in `Outline`
+    faces: Integers  # (n, 2) triangles (`Soup`) beside the edge: they cannot hide it; -1 where there is none
 
     @staticmethod
     def empty() -> Candidates:
@@ -34,6 +34,17 @@ class Candidates:
     @staticmethod
     def concatenate(parts: Sequence[Candidates]) -> Candidates:
         return Candidates(*(np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(Candidates)))
+
+    def __len__(self) -> int:
+        return len(self.start)
+
+    def __getitem__(self, which: NDArray[np.bool_] | Integers) -> Candidates:
+        return Candidates(*(getattr(self, f.name)[which] for f in fields(Candidates)))
+
+    def at(self, which: Integers, t: Reals) -> Reals:
+        """Points (k, 3) at parameters t (k,) of edges `which`."""
+        start = self.start[which]
+        return start + t[:, None] * (self.end[which] - start)
 
 
 def toward(source: Source, x: Reals) -> Reals:

@@ -2,31 +2,36 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from grimaldi.outlines.candidate import Candidates, toward
 from grimaldi.outlines.model import Integers, Reals
-from grimaldi.scene.model import Body, Cylinder, Mesh, Source, Sphere
+from grimaldi.outlines.soup import Soup, grouped
+from grimaldi.scene.model import Body, Cylinder, Source, Sphere
 
 CREASE = np.radians(30)  # the angle between two faces' normals from which their edge is meant to be sharp
 
 
-def radii(bodies: tuple[Body, ...], source: Source, edges: Candidates, body: Integers) -> Reals:
+def radii(bodies: Sequence[Body], soup: Soup, source: Source, edges: Candidates, body: Integers) -> Reals:
     """ρ (n,) of the surface along the light at silhouette edges [scene units]; 0 at rims, borders and creases.
 
     Exact for spheres and cylinders. Of a mesh it is that of the sphere which holds the corners of both faces
     beside the edge: exact where the mesh's corners lie on a sphere or, in strips, on a cylinder.
     """
     result = np.zeros(len(body))
-    for i, of in enumerate(bodies):
-        own = np.flatnonzero((body == i) & (np.linalg.norm(edges.normals[:, 1], axis=1) > 0))
-        shape = of.geometry
+    folds = np.flatnonzero(np.linalg.norm(edges.normals[:, 1], axis=1) > 0)
+    meshed = folds[edges.faces[folds, 0] >= 0]
+    result[meshed] = _of_mesh(soup, edges[meshed])
+    smooth = folds[edges.faces[folds, 0] < 0]
+    for i, which in grouped(body[smooth]):
+        own = smooth[which]
+        shape = bodies[i].geometry
         if isinstance(shape, Sphere):
             result[own] = shape.radius
         elif isinstance(shape, Cylinder):
             result[own] = _of_tube(shape, source, 0.5 * (edges.start + edges.end)[own])
-        elif isinstance(shape, Mesh):
-            result[own] = _of_mesh(shape, edges, own)
     return result
 
 
@@ -39,10 +44,10 @@ def _of_tube(tube: Cylinder, source: Source, x: Reals) -> Reals:
     return np.linalg.norm(place @ inverse[:3, :3], axis=1) / np.maximum((w[:, :2] ** 2).sum(1), 1e-300)
 
 
-def _of_mesh(mesh: Mesh, edges: Candidates, own: Integers) -> Reals:
+def _of_mesh(soup: Soup, edges: Candidates) -> Reals:
     """By the distance of the two faces' circumcentres, which lie right below where the sphere is parallel to them."""
-    lit, dark = np.moveaxis(edges.normals[own], 1, 0)
-    first, second = (_circumcentre(mesh.vertices[mesh.faces[edges.faces[own, side]]]) for side in (0, 1))
+    lit, dark = np.moveaxis(edges.normals, 1, 0)
+    first, second = (_circumcentre(soup.triangles(faces).T) for faces in edges.faces.T)
     angle = np.arctan2(np.linalg.norm(np.cross(lit, dark), axis=1), (lit * dark).sum(1))
     radius = np.linalg.norm(second - first, axis=1) / np.maximum(2 * np.tan(0.5 * angle), 1e-12)
     return np.where(angle < CREASE, radius, 0.0)

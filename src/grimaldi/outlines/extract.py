@@ -8,11 +8,17 @@ import numpy as np
 
 from grimaldi.outlines import curvature, cylinder, disk, mesh, planar, sphere
 from grimaldi.outlines.candidate import Candidates, toward
-from grimaldi.outlines.hidden import Obstacle, Queries, behind, obstacles
+from grimaldi.outlines.chains import chains
+from grimaldi.outlines.hidden import Sight
+from grimaldi.outlines.lines import each, ends, straight
 from grimaldi.outlines.lit import Stretches, lit_parts
+from grimaldi.outlines.memory import once
 from grimaldi.outlines.model import Integers, Outline, Reals
+from grimaldi.outlines.pieces import Pieces
+from grimaldi.outlines.soup import Soup
+from grimaldi.outlines.view import View
 from grimaldi.scene.bodies import vertices
-from grimaldi.scene.model import Body, Cylinder, Geometry, Mesh, Scene, Source, Sphere
+from grimaldi.scene.model import Body, Cylinder, Disk, Geometry, Mesh, Scene, Source, Sphere
 from grimaldi.scene.planar import PlanarOutline
 
 LONGEST = 1 / 32  # of the outlines' extent: how finely X→P visibility is told along a straight edge
@@ -35,32 +41,58 @@ def outline(scene: Scene, source: Source, *, sag: Sequence[float] | None = None)
     """
     if scene.screen:
         return _planar(scene, source, sag or [DEFAULT_SAG * curve(shape)[1] for shape in scene.screen])
-    sag = sag or [DEFAULT_SAG * curve(body.geometry)[1] for body in scene.bodies]
+    sag = tuple(sag or default_sags(scene.bodies))
+    return once(scene, ("outline", source, sag), lambda: _bodies(scene, source, sag))
+
+
+def _bodies(scene: Scene, source: Source, sag: Sequence[float]) -> Outline:
+    soup = soup_of(scene)
     edges, body = edges_of(scene, source, sag)
     if not len(body):
         return Outline.empty()
-    extents = np.zeros(len(scene.bodies))
-    for i in np.unique(body):
-        extents[i] = np.linalg.norm(np.ptp(edges.start[body == i], axis=0))
-    standing = obstacles(scene.bodies, source)
-    lit = lit_parts(standing, source, edges, body, LONGEST * extents[body])
+    sight = sight_of(scene.bodies, soup, source, edges, body)
+    lit = lit_parts(sight)
     coarsest = max((s for b, s in zip(scene.bodies, sag, strict=True) if is_curved(b.geometry)), default=0.0)
-    return assemble(
-        edges,
-        body,
-        lit,
-        gap_behind(standing, source, edges, body, lit),
-        source,
-        coarsest,
-        curvature.radii(scene.bodies, source, edges, body),
-    )
+    radius = curvature.radii(scene.bodies, soup, source, edges, body)
+    longest = LONGEST * _extents(edges.start, body)
+    return assemble(edges, body, lit, source, coarsest, radius=radius, longest=longest, sight=sight)
+
+
+def soup_of(scene: Scene) -> Soup:
+    """The triangles of a scene's bodies."""
+    return once(scene, ("soup",), lambda: Soup.of(scene.bodies))
+
+
+def default_sags(bodies: Sequence[Body]) -> list[float]:
+    """What curves may be off by where no wavelength says it; meshes have none."""
+    return [DEFAULT_SAG * curve(body.geometry)[1] if is_curved(body.geometry) else 0.0 for body in bodies]
 
 
 def edges_of(scene: Scene, source: Source, sag: Sequence[float]) -> tuple[Candidates, Integers]:
-    """The silhouette edges of a scene's bodies, lit or not, and the body (n,) of each; sag as in `outline`."""
-    parts = [_silhouette(body, source, s) for body, s in zip(scene.bodies, sag, strict=True)]
-    body = np.repeat(np.arange(len(parts)), [len(part.start) for part in parts])
-    return Candidates.concatenate(parts or [Candidates.empty()]), body
+    """The silhouette edges of a scene's bodies, lit or not, and the body (n,) of each, rising; sag as in `outline`."""
+    edges, body = once(scene, ("edges", source), lambda: mesh.silhouettes(soup_of(scene), source))
+    parts, owner = [edges], [body]
+    for i, (of, s) in enumerate(zip(scene.bodies, sag, strict=True)):
+        if not isinstance(of.geometry, Mesh):
+            parts.append(_curve(of.geometry, source, s))
+            owner.append(np.full(len(parts[-1]), i))
+    body = np.concatenate(owner)
+    order = np.argsort(body, kind="stable")
+    return Candidates.concatenate(parts)[order], body[order]
+
+
+def _extents(points: Reals, body: Integers) -> Reals:
+    """For each of points (n, 3) the diagonal of the box of all of its body, whose points follow each other."""
+    first = np.flatnonzero(np.append(True, np.diff(body) != 0))
+    size = np.maximum.reduceat(points, first) - np.minimum.reduceat(points, first)
+    return np.repeat(np.linalg.norm(size, axis=1), np.diff(np.append(first, len(body))))
+
+
+def sight_of(bodies: Sequence[Body], soup: Soup, source: Source, edges: Candidates, body: Integers) -> Sight:
+    """What stands before and behind edges, and behind points as far beside them as `gap_behind` asks."""
+    view = View.of(source, edges.start)
+    reach = max(float(np.abs(x).max(initial=0.0)) for x in (edges.start, edges.end))
+    return Sight.of(bodies, soup, view, edges, body, Pieces.of(view, edges, BESIDE * reach))
 
 
 def curve(shape: Geometry | PlanarOutline) -> tuple[Reals, float]:
@@ -79,30 +111,12 @@ def is_curved(shape: Geometry | PlanarOutline) -> bool:
     return shape.is_ellipse if isinstance(shape, PlanarOutline) else not isinstance(shape, Mesh)
 
 
-def _silhouette(body: Body, source: Source, sag: float) -> Candidates:
-    geometry = body.geometry
-    if isinstance(geometry, Mesh):
-        return mesh.silhouette(geometry, source)
+def _curve(geometry: Sphere | Disk | Cylinder, source: Source, sag: float) -> Candidates:
     if isinstance(geometry, Sphere):
         return sphere.silhouette(geometry, source, sag)
     if isinstance(geometry, Cylinder):
         return cylinder.silhouette(geometry, source, sag)
     return disk.silhouette(geometry, source, sag)
-
-
-def gap_behind(
-    standing: tuple[Obstacle, ...], source: Source, edges: Candidates, body: Integers, lit: Stretches
-) -> Reals:
-    """For each lit stretch, how far behind its middle its own body comes next; a wall along the ray does not."""
-    c, at = lit.candidate, 0.5 * (lit.low + lit.high)
-    span = edges.end[c] - edges.start[c]
-    x = edges.start[c] + at[:, None] * span
-    x += BESIDE * np.abs(x).max(initial=0.0) * _outward(source, x, span)
-    result = np.full(len(c), np.inf)
-    for number, of in enumerate(standing):
-        own = body[c] == number
-        result[own] = behind(of, source, Queries(x, body[c], edges.faces[c])[own])
-    return result
 
 
 def _planar(scene: Scene, source: Source, sag: Sequence[float]) -> Outline:
@@ -113,34 +127,53 @@ def _planar(scene: Scene, source: Source, sag: Sequence[float]) -> Outline:
             number.append(np.full(len(loop.start), -1 - i))
     edges = Candidates.concatenate(parts)
     n = len(edges.start)
-    return assemble(edges, np.concatenate(number), Stretches.whole(n), np.full(n, np.inf), source, max(sag))
+    return assemble(edges, np.concatenate(number), Stretches.whole(n), source, max(sag))
 
 
 def assemble(
     edges: Candidates,
     body: Integers,
     lit: Stretches,
-    behind: Reals,
     source: Source,
     sag: float,
+    *,
     radius: Reals | None = None,
+    longest: Reals | None = None,
+    sight: Sight | None = None,
 ) -> Outline:
-    """The lit stretches in the order of their chains; radius as in `Outline`, for each edge."""
-    c = lit.candidate
-    span = edges.end[c] - edges.start[c]
-    start = np.where((lit.low > 0)[:, None], edges.start[c] + lit.low[:, None] * span, edges.start[c])
-    end = np.where((lit.high < 1)[:, None], edges.start[c] + lit.high[:, None] * span, edges.end[c])
-    reach = np.abs(start).max(initial=0.0)
-    some = np.linalg.norm(end - start, axis=1) > 1e-13 * reach  # two cuts can fall on one Float64 place
-    start, end, c, behind = start[some], end[some], c[some], behind[some]
-    order, chain = _chains(start, end)
-    start, end, c = start[order], end[order], c[order]
-    interval = np.stack([lit.low, lit.high], axis=1)[some][order]
+    """The lit stretches of n edges in the order of their chains.
+
+    radius (n,) as in `Outline`, else 0; longest (n,): mesh edges that go on in one line become one, and then no
+    segment longer than this, else each stretch is a segment; sight: what tells how far behind its body comes next.
+    """
+    start, end = ends(edges, lit)
+    # two cuts can fall on one Float64 place
+    some = np.linalg.norm(end - start, axis=1) > 1e-13 * np.abs(start).max(initial=0.0)
+    order, chain = chains(start[some], end[some])
+    lit = lit[np.flatnonzero(some)[order]]
+    radius = np.zeros(len(body)) if radius is None else radius
+    lines = each(edges, lit) if longest is None else straight(edges, lit, chain, radius, longest)
+    start, end, c = lines.start, lines.end, lines.candidate
     out = _outward(source, 0.5 * (start + end), end - start)
+    behind = np.full(len(c), np.inf)
+    if sight is not None:
+        x = edges.at(c, lines.middle)
+        behind = sight.behind(
+            c, lines.middle, x + BESIDE * np.abs(x).max(initial=0.0) * _outward(source, x, end - start)
+        )
     outward = np.where((body[c] < 0)[:, None], -out, out)  # a hole's open side is the one its loop encloses
-    radius = np.zeros(len(c)) if radius is None else radius[c]
     return Outline(
-        start, end, body[c], edges.edge[c], interval, edges.normals[c], outward, behind[order], chain, radius, sag
+        start,
+        end,
+        body[c],
+        lines.edge,
+        lines.interval,
+        edges.normals[c],
+        outward,
+        behind,
+        chain[lines.stretch],
+        radius[c],
+        sag,
     )
 
 
@@ -148,28 +181,3 @@ def _outward(source: Source, x: Reals, span: Reals) -> Reals:
     """Unit vectors (n, 3) across the rays at x, to the right of edges that run along `span` (n, 3)."""
     out = np.cross(span, -toward(source, x))
     return out / np.maximum(np.linalg.norm(out, axis=1, keepdims=True), 1e-300)
-
-
-def _chains(start: Reals, end: Reals) -> tuple[Integers, Integers]:
-    """An order in which segments follow each other end to start, and the chain that each then belongs to."""
-    n = len(start)
-    starting: dict[bytes, list[int]] = {}
-    for i in range(n - 1, -1, -1):
-        starting.setdefault(start[i].tobytes(), []).append(i)
-    ends = {point.tobytes() for point in end}
-    # open chains first, from where nothing arrives
-    seeds = [i for i in range(n) if start[i].tobytes() not in ends]
-    used = np.zeros(n, bool)
-    order, chain, number = [], [], 0
-    for seed in [*seeds, *range(n)]:
-        if used[seed]:
-            continue
-        i: int | None = seed
-        while i is not None:
-            used[i] = True
-            order.append(i)
-            chain.append(number)
-            following = starting.get(end[i].tobytes(), [])
-            i = next((j for j in following if not used[j]), None)
-        number += 1
-    return np.array(order, np.int64), np.array(chain, np.int64)

@@ -1,185 +1,171 @@
-"""Whether points are hidden from a source, in Float64 and without ray offsets."""
+"""Whether points on edges are hidden from a source, in Float64 and without ray offsets."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import KDTree
 
-from grimaldi.outlines.candidate import toward
+from grimaldi.outlines.candidate import Candidates, toward
 from grimaldi.outlines.model import Integers, Reals
+from grimaldi.outlines.pieces import Pieces
+from grimaldi.outlines.soup import Soup, grouped
+from grimaldi.outlines.view import View
+from grimaldi.scene.bodies import vertices
 from grimaldi.scene.model import Body, Cylinder, Disk, Mesh, Source, Sphere
 
-TOUCHING = 1e-9  # of the way to the source (of the scene's size for a plane wave): no nearer blocker counts
-WIDE = 0.05  # view radius above which a triangle is held against every point
-PART = 1024  # points held against triangles at once
-
-
-def view(source: Source, x: Reals) -> Reals:
-    """Where points (..., 3) appear to the source: the unit direction, or the place across a plane wave's rays."""
-    if source.position is not None:
-        v = x - source.position
-        return v / np.maximum(np.linalg.norm(v, axis=-1, keepdims=True), 1e-300)
-    assert source.direction is not None
-    return x - (x @ source.direction)[..., None] * source.direction
-
-
-class Balls:
-    """Balls in a source's view, found by the points they hold: small ones through a tree, wide ones always."""
-
-    def __init__(self, centres: Reals, radii: Reals, wide: float) -> None:
-        self.centres, self.radii = centres, radii
-        self.small, self.large = np.flatnonzero(radii <= wide), np.flatnonzero(radii > wide)
-        self.widest = float(radii[self.small].max(initial=0.0))
-        self.tree = KDTree(centres[self.small])
-
-    def holding(self, points: Reals, margin: float = 0.0) -> tuple[Integers, Integers]:
-        """Pairs (ball, point) of points (n, 3) within `margin` of the balls."""
-        found = self.tree.query_ball_point(points, self.widest + margin, return_sorted=False)
-        lengths = np.fromiter(map(len, found), np.int64, len(found))
-        point = np.repeat(np.arange(len(points)), lengths)
-        parts = [np.asarray(f, np.int64) for f in found if f]
-        ball = self.small[np.concatenate(parts)] if parts else np.empty(0, np.int64)
-        near = np.linalg.norm(points[point] - self.centres[ball], axis=1) <= self.radii[ball] + margin
-        return (
-            np.concatenate([ball[near], np.repeat(self.large, len(points))]),
-            np.concatenate([point[near], np.tile(np.arange(len(points)), len(self.large))]),
-        )
+TOUCHING = 1e-9  # of the way to the source (of the edges' extent for a plane wave): no nearer blocker counts
+PART = 1 << 16  # triangles at once
+PAIRS = 1 << 14  # of a point and what may hide it at once: what fits the cache
 
 
 @dataclass(frozen=True, eq=False)
-class Triangles:
-    """A mesh as a source sees it: corners (m, 3, 3) in space, and the balls that hold them in view."""
+class Sight:
+    """Edges, and for each piece of them all that may lie before or behind it in the source's view.
 
-    corners: Reals
-    balls: Balls
+    These are triangles of the soup, and after them, from len(soup) on, bodies that are no meshes.
+    """
 
+    source: Source
+    bodies: Sequence[Body]
+    soup: Soup
+    edges: Candidates
+    body: Integers  # (n,) whose edges they are
+    pieces: Pieces
+    first: Integers  # (pieces + 1,) each piece's part of `found`
+    found: Integers
+    least: float  # how far before a point, in its ways to the source, a blocker has to be
 
-Obstacle = Triangles | Sphere | Disk | Cylinder
+    @staticmethod
+    def of(bodies: Sequence[Body], soup: Soup, view: View, edges: Candidates, body: Integers, pieces: Pieces) -> Sight:
+        """Gather what overlaps each piece in view. Triangles beside an edge do not count for it."""
+        pairs = [*_triangles(soup, view, edges, pieces), _shapes(bodies, len(soup), view, pieces)]
+        piece, found = (np.concatenate(x) for x in zip(*pairs, strict=True))
+        order = np.argsort(piece, kind="stable")
+        first = np.append(0, np.cumsum(np.bincount(piece, minlength=len(pieces))))
+        size = max(float(np.ptp(edges.start, axis=0).max(initial=0.0)), 1e-300)
+        least = TOUCHING * (size if view.source.is_plane else 1.0)
+        return Sight(view.source, bodies, soup, edges, body, pieces, first, found[order], least)
 
+    def _pairs(self, edge: Integers, t: Reals) -> Iterator[tuple[Integers, Integers]]:
+        """Which of the points at parameters t of edges may meet what, in parts; all of a point lie in one part."""
+        piece = self.pieces.holding(edge, t)
+        count = self.first[piece + 1] - self.first[piece]
+        some = np.flatnonzero(count)
+        total = np.cumsum(count[some])
+        cuts = np.searchsorted(total, np.arange(PAIRS, total[-1] if len(total) else 0, PAIRS))
+        for part in np.split(some, np.unique(cuts)):
+            n = count[part]
+            query = np.repeat(part, n)
+            begin = np.repeat(self.first[piece[part]] - (np.cumsum(n) - n), n)
+            yield query, self.found[begin + np.arange(len(query))]
 
-def obstacles(bodies: tuple[Body, ...], source: Source) -> tuple[Obstacle, ...]:
-    """Bodies prepared for `hidden` and `behind`."""
-    return tuple(_triangles(b.geometry, source) if isinstance(b.geometry, Mesh) else b.geometry for b in bodies)
+    def hidden(self, edge: Integers, t: Reals) -> NDArray[np.bool_]:
+        """Whether something stands between points at parameters t (k,) of edges (k,) and the source."""
+        result = np.zeros(len(edge), bool)
+        most = np.inf if self.source.is_plane else 1.0
+        x = self.edges.at(edge, t)
+        for query, found in self._pairs(edge, t):
+            for hit, place in self._meetings(x[query], self.body[edge[query]], found):
+                result[query[hit[(place > self.least) & (place < most)]]] = True
+        return result
 
+    def behind(self, edge: Integers, t: Reals, x: Reals) -> Reals:
+        """How far behind points x (k, 3) beside edges, at parameters t, their own body comes next; inf where not."""
+        result = np.full(len(edge), np.inf)
+        owner = np.concatenate([self.soup.body, np.arange(len(self.bodies))])
+        for query, found in self._pairs(edge, t):
+            own = owner[found] == self.body[edge[query]]
+            query, found = query[own], found[own]
+            for hit, place in self._meetings(x[query], self.body[edge[query]], found):
+                away = place < -TOUCHING
+                at = query[hit[away]]
+                length = np.linalg.norm(toward(self.source, x[at]), axis=1)
+                np.minimum.at(result, at, -place[away] * length)
+        return result
 
-def _triangles(mesh: Mesh, source: Source) -> Triangles:
-    corners = mesh.vertices[mesh.faces]
-    seen = view(source, corners)
-    centres = seen.mean(axis=1)
-    radii = np.linalg.norm(seen - centres[:, None], axis=2).max(axis=1)
-    if source.is_plane:
-        wide = WIDE * float(np.ptp(seen, axis=(0, 1)).max())
-    else:
-        wide = WIDE
-        # a triangle near the source sags: its directions leave the chord's ball by less than its radius squared
-        radii = np.where(radii > 0.8, np.inf, radii * (1 + radii))
-    # few triangles much larger than most would make the tree's search wide for all
-    wide = min(wide, 8 * float(np.median(radii)))
-    return Triangles(corners, Balls(centres, radii * (1 + 1e-9) + 1e-12, wide))
+    def _meetings(self, x: Reals, body: Integers, found: Integers) -> Iterator[tuple[Integers, Reals]]:
+        """Where lines x + t·toward meet what was found: which pair, and t.
 
-
-@dataclass(frozen=True, eq=False)
-class Queries:
-    """Points (n, 3), and for each the body and the two triangles of it that meet there and cannot hide it."""
-
-    x: Reals
-    body: Integers
-    faces: Integers  # (n, 2)
-
-    def __getitem__(self, which: NDArray[np.bool_] | Integers) -> Queries:
-        return Queries(self.x[which], self.body[which], self.faces[which])
-
-
-def hidden(obstacles: tuple[Obstacle, ...], source: Source, queries: Queries) -> NDArray[np.bool_]:
-    """Whether something stands between each point and the source."""
-    result = np.zeros(len(queries.x), bool)
-    size = max((float(np.ptp(queries.x, axis=0).max()), 1e-300)) if len(queries.x) else 1.0
-    least = TOUCHING * (size if source.is_plane else 1.0)
-    for number, obstacle in enumerate(obstacles):
-        rest = np.flatnonzero(~result)
-        if not len(rest):
-            break
-        open_ = queries[rest]
-        own = open_.body == number
-        if isinstance(obstacle, Triangles):
-            for point, t in _meetings(obstacle, source, open_, own):
-                result[rest[point[_between(source, t, least)]]] = True
-        elif isinstance(obstacle, Cylinder):
-            for t in _on_tube(obstacle, source, open_.x, own):
-                result[rest[_between(source, t, least)]] = True
-        else:
-            other = rest[~own]
-            x = queries.x[other]
-            if isinstance(obstacle, Sphere):
-                result[other] = _by_sphere(obstacle, source, x, least)
-            else:
-                result[other] = _by_disk(obstacle, source, x, least)
-    return result
-
-
-def _between(source: Source, t: Reals, least: float) -> NDArray[np.bool_]:
-    """Whether x + t·toward lies strictly between x and the source."""
-    return (t > least) & (t < (np.inf if source.is_plane else 1.0))
-
-
-def behind(obstacle: Obstacle, source: Source, queries: Queries) -> Reals:
-    """How far behind each point, away from the source, its own body comes next [scene units]; inf where it does not."""
-    result = np.full(len(queries.x), np.inf)
-    own = np.ones(len(queries.x), bool)
-    for point, t in _own_meetings(obstacle, source, queries, own):
-        away = t < -TOUCHING
-        length = np.linalg.norm(toward(source, queries.x[point]), axis=1)
-        np.minimum.at(result, point[away], (-t * length)[away])
-    return result
-
-
-def _own_meetings(
-    obstacle: Obstacle, source: Source, queries: Queries, own: NDArray[np.bool_]
-) -> Iterator[tuple[Integers, Reals]]:
-    """Where lines that touch a body's outline meet it again, as `_meetings`; spheres and discs never."""
-    if isinstance(obstacle, Triangles):
-        yield from _meetings(obstacle, source, queries, own)
-    elif isinstance(obstacle, Cylinder):
-        for t in _on_tube(obstacle, source, queries.x, own):
-            met = np.flatnonzero(np.isfinite(t))
-            yield met, t[met]
-
-
-def _meetings(
-    mesh: Triangles, source: Source, queries: Queries, own: NDArray[np.bool_]
-) -> Iterator[tuple[Integers, Reals]]:
-    """Where lines x + t·toward meet triangles, in parts: which query, and t. Triangles beside an edge do not count."""
-    for first in range(0, len(queries.x), PART):
-        part = slice(first, first + PART)
-        face, point = mesh.balls.holding(view(source, queries.x[part]))
-        point += first
-        beside = own[point] & (queries.faces[point] == face[:, None]).any(axis=1)
-        face, point = face[~beside], point[~beside]
-        t = meeting(mesh.corners[face], queries.x[point], toward(source, queries.x[point]))
+        Lines that touch a body's own outline never meet its disc or sphere again, and its tube once.
+        """
+        flat = np.flatnonzero(found < len(self.soup))
+        t = meeting(self.soup.triangles(found[flat]), x[flat], toward(self.source, x[flat]))
         met = np.isfinite(t)
-        yield point[met], t[met]
+        yield flat[met], t[met]
+        rest = np.flatnonzero(found >= len(self.soup))
+        for i, which in grouped(found[rest] - len(self.soup)):
+            pair = rest[which]
+            shape, own = self.bodies[i].geometry, body[pair] == i
+            if isinstance(shape, Cylinder):
+                places = _on_tube(shape, self.source, x[pair], own)
+            elif isinstance(shape, Sphere):
+                places = _on_sphere(shape, self.source, x[pair], own)
+            else:
+                assert isinstance(shape, Disk)
+                places = (_on_disk(shape, self.source, x[pair], own),)
+            for t in places:
+                met = np.isfinite(t)
+                yield pair[met], t[met]
+
+
+def _triangles(soup: Soup, view: View, edges: Candidates, pieces: Pieces) -> Iterator[tuple[Integers, Integers]]:
+    """Pairs (piece, triangle) that overlap in view, in parts."""
+    seen = view(soup.points)
+    for begin in range(0, len(soup), PART):
+        corners = [seen.take(c, axis=1) for c in soup.corners[:, begin : begin + PART]]
+        triangle, piece = pieces.index.overlapping(*view.boxes(*corners))
+        edge, number = pieces.edge[piece], begin + triangle
+        beside = (edges.faces[edge, 0] == number) | (edges.faces[edge, 1] == number)
+        kept = ~beside & pieces.may_be_met(piece, [c.take(triangle, axis=1) for c in corners])
+        yield piece[kept], number[kept]
+
+
+def _shapes(bodies: Sequence[Body], offset: int, view: View, pieces: Pieces) -> tuple[Integers, Integers]:
+    """Pairs (piece, offset + body) of bodies that are no meshes and overlap in view."""
+    number = np.array([i for i, body in enumerate(bodies) if not isinstance(body.geometry, Mesh)], np.int64)
+    if not len(number):
+        return number, number
+    corners = [vertices(bodies[i].geometry) for i in number]
+    sizes = np.array([len(x) for x in corners])
+    boxes = np.empty((2, 3, len(number)))
+    for size, of in grouped(sizes):
+        boxes[:, :, of] = view.boxes(*(view(np.array([corners[i][k] for i in of]).T) for k in range(size)))
+    shape, piece = pieces.index.overlapping(*boxes)
+    return piece, offset + number[shape]
 
 
 def meeting(corners: Reals, x: Reals, w: Reals) -> Reals:
-    """t where lines x + t w meet triangles (n, 3, 3), NaN where they miss; an edge belongs to both its triangles."""
-    a, b, c = np.moveaxis(corners - x[:, None], 1, 0)
-    bc, ca, ab = np.cross(b, c), np.cross(c, a), np.cross(a, b)
-    u, v, s = (np.einsum("ij,ij->i", w, n) for n in (bc, ca, ab))
+    """t where lines x + t w meet triangles (3 coordinates, 3 corners, n), NaN where they miss.
+
+    x, w (n, 3). An edge belongs to both its triangles.
+    """
+    a, b, c = (corners - x.T[:, None]).swapaxes(0, 1)
+    bc, ca, ab = _cross(b, c), _cross(c, a), _cross(a, b)
+    d = np.ascontiguousarray(w.T)
+    u, v, s = _dot(d, bc), _dot(d, ca), _dot(d, ab)
     inside = ((u >= 0) & (v >= 0) & (s >= 0)) | ((u <= 0) & (v <= 0) & (s <= 0))
     with np.errstate(divide="ignore", invalid="ignore"):
-        return np.where(inside, np.einsum("ij,ij->i", a, bc) / (u + v + s), np.nan)
+        return np.where(inside, _dot(a, bc) / (u + v + s), np.nan)
 
 
-def _by_sphere(sphere: Sphere, source: Source, x: Reals, least: float) -> NDArray[np.bool_]:
+def _cross(p: Reals, q: Reals) -> Reals:
+    return np.stack([p[1] * q[2] - p[2] * q[1], p[2] * q[0] - p[0] * q[2], p[0] * q[1] - p[1] * q[0]])
+
+
+def _dot(p: Reals, q: Reals) -> Reals:
+    return p[0] * q[0] + p[1] * q[1] + p[2] * q[2]
+
+
+def _on_sphere(sphere: Sphere, source: Source, x: Reals, own: NDArray[np.bool_]) -> tuple[Reals, Reals]:
+    """Both t where x + t·toward meets a sphere, NaN where it does not or only touches."""
     w, d = toward(source, x), x - sphere.centre
     a, b, c = ((p * q).sum(1) for p, q in ((w, w), (w, d), (d, d)))
-    root = b * b - a * (c - sphere.radius**2)
-    reach = np.sqrt(np.maximum(root, 0))
-    return (root > 0) & (_between(source, (-b - reach) / a, least) | _between(source, (-b + reach) / a, least))
+    root = np.where(own, -1.0, b * b - a * (c - sphere.radius**2))
+    reach = np.where(root > 0, np.sqrt(np.maximum(root, 0)), np.nan)
+    return (-b - reach) / a, (-b + reach) / a
 
 
 def _on_tube(tube: Cylinder, source: Source, x: Reals, own: NDArray[np.bool_]) -> tuple[Reals, Reals]:
@@ -200,11 +186,12 @@ def _on_tube(tube: Cylinder, source: Source, x: Reals, own: NDArray[np.bool_]) -
     return first, second
 
 
-def _by_disk(disk: Disk, source: Source, x: Reals, least: float) -> NDArray[np.bool_]:
+def _on_disk(disk: Disk, source: Source, x: Reals, own: NDArray[np.bool_]) -> Reals:
+    """t where x + t·toward meets a disc, NaN where it does not."""
     inverse = np.linalg.inv(disk.to_world)
     p = x @ inverse[:3, :3].T + inverse[:3, 3]
     w = toward(source, x) @ inverse[:3, :3].T
     with np.errstate(divide="ignore", invalid="ignore"):
         t = -p[:, 2] / w[:, 2]
         at = p[:, :2] + t[:, None] * w[:, :2]
-    return (w[:, 2] != 0) & ((at**2).sum(1) <= 1) & _between(source, t, least)
+        return np.where((w[:, 2] != 0) & ((at**2).sum(1) <= 1) & ~own, t, np.nan)

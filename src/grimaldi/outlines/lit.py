@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from grimaldi.outlines.candidate import Candidates, toward
-from grimaldi.outlines.hidden import WIDE, Balls, Obstacle, Queries, hidden, view
+from grimaldi.outlines.hidden import Sight
 from grimaldi.outlines.model import Integers, Reals
+from grimaldi.outlines.pieces import Pieces
 from grimaldi.scene.model import Source
 
 SAMPLES = (0.03, 0.5, 0.97)  # of each stretch between two crossings
@@ -33,21 +34,16 @@ class Stretches:
         return Stretches(self.candidate[which], self.low[which], self.high[which])
 
 
-def lit_parts(
-    obstacles: tuple[Obstacle, ...], source: Source, edges: Candidates, body: Integers, longest: Reals
-) -> Stretches:
-    """What the source reaches of the candidates, in order along them.
+def lit_parts(sight: Sight) -> Stretches:
+    """What the source reaches of edges, in order along them.
 
-    body (n,): whose edges they are; longest (n,): no stretch of an edge comes out longer than this. Whether the
-    source reaches an edge changes only where it passes behind another outline (found exactly, by the signs of
+    Whether it reaches an edge changes only where that passes behind another outline (found exactly, by the signs of
     determinants) or runs into a surface (by bisection between samples).
     """
-    all_ = _between_cuts(len(edges.start), *_crossings(source, edges))
+    all_ = _between_cuts(len(sight.edges), *_crossings(sight.source, sight.edges, sight.pieces))
 
     def reached(stretches: Stretches, at: Reals) -> NDArray[np.bool_]:
-        c = stretches.candidate
-        x = edges.start[c] + at[:, None] * (edges.end[c] - edges.start[c])
-        return ~hidden(obstacles, source, Queries(x, body[c], edges.faces[c]))
+        return ~sight.hidden(stretches.candidate, at)
 
     parts = []
     places = [all_.low + f * (all_.high - all_.low) for f in SAMPLES]
@@ -67,26 +63,18 @@ def lit_parts(
     for i, state in enumerate(states):
         parts.append((np.flatnonzero(state), borders[i][state], borders[i + 1][state]))
     stretch, low, high = _joined(*(np.concatenate(p) for p in zip(*parts, strict=True)))
-    return _divided(Stretches(all_.candidate[stretch], low, high), edges, longest)
+    return Stretches(all_.candidate[stretch], low, high)
 
 
-def _crossings(source: Source, edges: Candidates) -> tuple[Integers, Reals]:
+def _crossings(source: Source, edges: Candidates, pieces: Pieces) -> tuple[Integers, Reals]:
     """Where edges pass behind others in the source's view: edge and parameter, of the farther and of the nearer one.
 
     The farther one may be hidden from there on, and behind the nearer one its own body may begin.
     """
-    a, b = view(source, edges.start), view(source, edges.end)
-    centres, radii = 0.5 * (a + b), 0.5 * np.linalg.norm(b - a, axis=1)
-    scale = 1.0 if not source.is_plane else max(float(np.ptp(centres, axis=0).max()), 1e-300)
-    # few edges much longer than most would make the tree's search wide for all
-    wide = min(WIDE * scale, 8 * float(np.median(radii)))
-    radii = radii * (1 + radii / scale) + 1e-12 * scale
-    balls = Balls(centres, radii, wide)
-    i, j = balls.holding(centres, balls.widest)
-    i, j = np.concatenate([i, j]), np.concatenate([j, i])  # a wide edge finds the narrow ones, not they it
+    i, j = (pieces.edge[piece] for piece in pieces.index.overlapping(pieces.low, pieces.high))
     shared = (edges.start[i] == edges.end[j]).all(1) | (edges.end[i] == edges.start[j]).all(1)
-    keep = (i != j) & ~shared
-    i, j = np.divmod(np.unique(i[keep] * len(centres) + j[keep]), len(centres))
+    pair = np.sort((i * len(edges) + j)[(i != j) & ~shared])
+    i, j = np.divmod(pair[np.append(True, np.diff(pair) != 0)[: len(pair)]], len(edges))
     # i is cut by the plane through the source and j, and the other way round
     t, across_i = _cut(source, edges, i, j)
     s, across_j = _cut(source, edges, j, i)
@@ -145,17 +133,3 @@ def _joined(stretch: Integers, low: Reals, high: Reals) -> tuple[Integers, Reals
     first = np.flatnonzero(np.append(True, ~follows)[: len(order)])
     last = np.append(first[1:], len(order))[: len(first)] - 1
     return stretch[first], low[first], high[last]
-
-
-def _divided(parts: Stretches, edges: Candidates, longest: Reals) -> Stretches:
-    """Stretches cut evenly so that none is longer than `longest`."""
-    length = np.linalg.norm(edges.end - edges.start, axis=1)[parts.candidate] * (parts.high - parts.low)
-    pieces = np.maximum(np.ceil(length / longest[parts.candidate]), 1).astype(np.int64)
-    which = np.repeat(np.arange(len(pieces)), pieces)
-    step = np.arange(len(which)) - np.repeat(np.cumsum(pieces) - pieces, pieces)
-    span = (parts.high - parts.low)[which] / pieces[which]
-    low = parts.low[which] + step * span
-    high = np.where(step + 1 == pieces[which], parts.high[which], low + span)
-    # neighbours share their end bit for bit
-    low[1:] = np.where(which[1:] == which[:-1], high[:-1], low[1:])
-    return Stretches(parts.candidate[which], low, high)

@@ -7,101 +7,137 @@ matters. Each triangle's side is decided once: the edges of a closed mesh form c
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
-from grimaldi.outlines.candidate import Candidates, edge_on, facing, toward
+from grimaldi.outlines.candidate import EDGE_ON, Candidates, edge_on, facing
 from grimaldi.outlines.model import Integers, Reals
-from grimaldi.scene.model import Mesh, Source
+from grimaldi.outlines.soup import Soup
+from grimaldi.scene.model import Source
+
+PART = 1 << 15  # triangles at once: what fits the cache
 
 
-def weld(mesh: Mesh) -> tuple[Reals, Integers]:
-    """Vertices merged by position (n, 3), and faces (m, 3) among them; faces without three corners keep no edge."""
-    points = np.ascontiguousarray(mesh.vertices + 0.0)  # -0.0 becomes 0.0
-    keys = points.view(np.dtype((np.void, points.itemsize * 3))).ravel()
-    _, first, inverse = np.unique(keys, return_index=True, return_inverse=True)
-    return points[first], inverse[mesh.faces]
+def sides(soup: Soup, source: Source) -> NDArray[np.int8]:
+    """±1: whether triangles (m,) turn counter-clockwise along the rays of the source; 0 if their body stops no ray.
 
-
-def has_corners(faces: Integers) -> NDArray[np.bool_]:
-    """Whether faces (m, 3) join three different vertices."""
-    return (faces != np.roll(faces, 1, axis=1)).all(axis=1)
-
-
-def sides(source: Source, corners: Reals) -> Integers:
-    """±1: whether triangles (m, 3, 3) turn counter-clockwise along the rays of the source.
-
-    Edge-on ones turn as they would for the source a little nearer to their common middle: winding does not matter,
-    and a box in light along its walls is bounded by the border of its front.
+    Edge-on ones turn as they would for the source a little nearer to the common middle of their body: winding does
+    not matter, and a box in light along its walls is bounded by the border of its front. A body all of whose
+    triangles are edge-on, a sheet in the plane of its rays, stops none.
     """
-    a, area = corners[:, 0], areas(corners)
-    turn = -np.einsum("ij,ij->i", area, toward(source, a))
-    nearer = np.einsum("ij,ij->i", area, a - corners.mean(axis=(0, 1)))
-    return np.where(np.where(edge_on(source, area, a), nearer, turn) < 0, -1, 1)
+    side, level = np.empty(len(soup), np.int8), np.empty(len(soup), bool)
+    for first in range(0, len(soup), PART):
+        part = slice(first, first + PART)
+        a, area = _areas(soup, part)
+        if source.position is not None:
+            w = [s - x for s, x in zip(source.position, a, strict=True)]
+        else:
+            assert source.direction is not None
+            w = [-d for d in source.direction]
+        along, area2, w2 = _dot(area, w), _dot(area, area), _dot(w, w)
+        side[part] = np.where(along > 0, -1, 1)
+        level[part] = along * along <= EDGE_ON**2 * area2 * w2
+    some = np.flatnonzero(level)
+    if len(some):
+        a, area = _areas(soup, some)
+        middle = _middles(soup)[:, soup.body[some]]
+        side[some] = np.where(_dot(area, a - middle) < 0, -1, 1)
+        standing = np.zeros(len(soup.first) - 1, bool)
+        standing[soup.body[~level]] = True
+        side[~standing[soup.body]] = 0
+    return side
 
 
-def areas(corners: Reals) -> Reals:
-    """Twice the area vectors (m, 3) of triangles (m, 3, 3)."""
-    a, b, c = np.moveaxis(corners, 1, 0)
-    return np.cross(b - a, c - a)
+def _areas(soup: Soup, which: slice | Integers) -> tuple[Reals, Reals]:
+    """First corners (3, m) and twice the area vectors (3, m) of triangles."""
+    a, b, c = (soup.points.take(corners[which], axis=1) for corners in soup.corners)
+    (ux, uy, uz), (vx, vy, vz) = b - a, c - a
+    return a, np.stack([uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx])
 
 
-def silhouette(mesh: Mesh, source: Source) -> Candidates:
-    """All edges of the mesh that bound its light: folds, and borders of open meshes.
+def _dot(p: Any, q: Any) -> Any:
+    return p[0] * q[0] + p[1] * q[1] + p[2] * q[2]
+
+
+def _middles(soup: Soup) -> Reals:
+    """The mean (3, bodies) of each body's corners."""
+    total = np.array([np.bincount(soup.body, x[soup.corners].sum(axis=0), len(soup.first) - 1) for x in soup.points])
+    return total / np.maximum(3 * np.diff(soup.first), 1)
+
+
+def silhouettes(soup: Soup, source: Source) -> tuple[Candidates, Integers]:
+    """All edges of meshes that bound their light, folds and borders of open meshes, and the body (n,) of each.
 
     The first normal of a fold is that of the face towards the source, turned to it; the second one's face lies
     behind and its normal points away, so that the body is behind both. A border has one normal.
     """
-    points, faces = weld(mesh)
-    whole = has_corners(faces)
-    index, faces = np.flatnonzero(whole), faces[whole]
-    corners = points[faces]
-    if edge_on(source, areas(corners), corners[:, 0]).all():  # a sheet in the plane of its rays stops none
-        return Candidates.empty()
-    side = sides(source, corners)
+    side = np.where(soup.has_corners, sides(soup, source), 0)
+    n = soup.points.shape[1]
+    # a fold's ends have triangles of both sides, a border's are told by `at_border`: few edges of a fine mesh do
+    turned = np.zeros((2, n), bool)
+    for way, sign in enumerate((1, -1)):
+        turned[way, soup.corners[:, side == sign].ravel()] = True
+    marked = (turned[0] & turned[1]) | soup.at_border
+    at_ends = marked[soup.corners] & (side != 0)
+    face, corner = np.nonzero((at_ends & np.roll(at_ends, -1, axis=0)).T)
+    tail, head = soup.corners[corner, face], soup.corners[(corner + 1) % 3, face]
 
-    tail, head = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
     forward = tail < head
-    key = np.where(forward, tail, head) * len(points) + np.where(forward, head, tail)
+    key = np.where(forward, tail, head) * n + np.where(forward, head, tail)
     order = np.argsort(key, kind="stable")
-    _, first, count = np.unique(key[order], return_index=True, return_counts=True)
-    turn = np.where(forward, 1, -1) * np.repeat(side, 3)
+    first = np.flatnonzero(np.append(True, np.diff(key[order]) != 0)[: len(key)])
+    count = np.diff(np.append(first, len(key)))
+    turn = np.where(forward, 1, -1) * side[face]
     total = np.add.reduceat(turn[order], first) if len(first) else first
     bounds = np.flatnonzero(np.abs(total) == count)
+    bounds = bounds[np.argsort(order[first[bounds]])]  # as the mesh has them
 
-    corner = order[first[bounds]]
-    along = turn[corner] > 0
-    low, high = np.where(forward, tail, head)[corner], np.where(forward, head, tail)[corner]
-    start, end = points[np.where(along, low, high)], points[np.where(along, high, low)]
-    two = count[bounds] == 2
-    face1 = corner // 3
-    face2 = np.where(two, order[np.minimum(first[bounds] + 1, len(order) - 1)] // 3, -1)
-    normals, swap = normals_beside(points, faces, source, start, face1, face2)
+    one = order[first[bounds]]
+    two = order[np.minimum(first[bounds] + 1, max(len(order) - 1, 0))]
+    face1, face2 = face[one], np.where(count[bounds] == 2, face[two], -1)
+    along = side[face1] > 0
+    start, end = (soup.points[:, np.where(along, *ends)].T for ends in ((tail[one], head[one]), (head[one], tail[one])))
+    normals, swap = normals_beside(soup, source, start, face1, face2)
+    body = soup.body[face1]
+    edge = 3 * (face1 - soup.first[body]) + corner[one]
     face1, face2 = np.where(swap, face2, face1), np.where(swap, face1, face2)
-    beside = np.stack([index[face1], np.where(two, index[face2], -1)], axis=1)
-    return Candidates(start, end, normals, bounds, beside)
+    beside = np.stack([face1, face2], axis=1)
+    return Candidates(start, end, normals, edge, beside), body
 
 
 def normals_beside(
-    points: Reals, faces: Integers, source: Source, x: Reals, face1: Integers, face2: Integers
-) -> tuple[Reals, np.ndarray]:
-    """Normals (n, 2, 3) beside edges at x, the face towards the source first, and where face2 is that one."""
-    corners = points[faces]
-    area = areas(corners)
-    unit = area / np.maximum(np.linalg.norm(area, axis=1, keepdims=True), 1e-300)
-    n1, n2 = facing(source, unit[face1], x), facing(source, unit[face2], x)
+    soup: Soup, source: Source, x: Reals, face1: Integers, face2: Integers
+) -> tuple[Reals, NDArray[np.bool_]]:
+    """Normals (n, 2, 3) beside edges at x, the face towards the source first, and where face2 is that one.
+
+    face1, face2 (n,): triangles of the soup that meet at the edges; face2 is -1 where there is one only.
+    """
+    corners1, corners2 = soup.triangles(face1).T, soup.triangles(face2).T
+    n1, n2 = facing(source, _unit_normals(corners1), x), facing(source, _unit_normals(corners2), x)
     two = face2 >= 0
-    out1, out2 = _furthest(n2, corners[face1] - x[:, None]), _furthest(n1, corners[face2] - x[:, None])
+    out1, out2 = _furthest(n2, corners1 - x[:, None]), _furthest(n1, corners2 - x[:, None])
     level1, level2 = edge_on(source, n1, x), edge_on(source, n2, x)
     # face2 is in front where it bulges out of the plane of face1 towards the source
     swap = two & np.where(level1, out1 < 0, out2 > 0)
     # an edge-on face's normal points away from the other face, a lone one's from the middle of the mesh
-    inward = np.where(two, (out2 > 0) != swap, np.einsum("ij,ij->i", n1, x - points.mean(axis=0)) < 0)
+    inward = (out2 > 0) != swap
+    if (lone := level1 & ~two).any():
+        middle = _middles(soup)[:, soup.body[face1[lone]]].T
+        inward[lone] = np.einsum("ij,ij->i", n1[lone], x[lone] - middle) < 0
     n1 = np.where((level1 & inward)[:, None], -n1, n1)
     n2 = np.where((two & level2 & ((out1 > 0) == swap))[:, None], -n2, n2)
     lit = np.where(swap[:, None], n2, n1)
     dark = np.where(two[:, None], -np.where(swap[:, None], n1, n2), 0.0)
     return np.stack([lit, dark], axis=1), swap
+
+
+def _unit_normals(corners: Reals) -> Reals:
+    """(n, 3) of triangles (n, 3, 3); 0 where they have no area."""
+    a, b, c = np.moveaxis(corners, 1, 0)
+    area = np.cross(b - a, c - a)
+    return area / np.maximum(np.linalg.norm(area, axis=1, keepdims=True), 1e-300)
 
 
 def _furthest(normals: Reals, corners: Reals) -> Reals:

@@ -23,7 +23,7 @@ class Outline:
     start: Reals  # (n, 3)
     end: Reals  # (n, 3)
     body: Integers  # (n,) index into Scene.bodies; -1 - i for planar outline i
-    edge: Integers  # (n,) the mesh edge it lies on, -1 on smooth shapes
+    edge: Integers  # (n,) the mesh edge it lies on: 3 f + i from corner i of face f on; -1 on smooth shapes
     interval: Reals  # (n, 2) the lit part of that edge, as parameters in 0..1
     normals: Reals  # (n, 2, 3) unit normals of the two faces beside, towards the source first; 0 where there is none
     outward: Reals  # (n, 3) unit, across the ray from the source, towards the open side

@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 
 from grimaldi.outlines import cylinder, disk
 from grimaldi.outlines.candidate import Candidates, closed_curve, polygon, toward
-from grimaldi.outlines.extract import assemble, curve, gap_behind
-from grimaldi.outlines.hidden import Queries, hidden, obstacles
+from grimaldi.outlines.extract import assemble, curve, sight_of, soup_of
 from grimaldi.outlines.lit import Stretches
-from grimaldi.outlines.mesh import has_corners, normals_beside, weld
+from grimaldi.outlines.mesh import normals_beside
 from grimaldi.outlines.model import Outline, Reals
+from grimaldi.outlines.soup import Soup
 from grimaldi.outlines.sphere import across, tangent_circle
 from grimaldi.scene.model import Cylinder, Disk, Mesh, Scene, Source, Sphere
 
@@ -37,30 +37,24 @@ def offset_outline(scene: Scene, source: Source, epsilon: float | None = None) -
     of a disk the rim, of a cylinder both rims and its tangent lines, each as about 32 edges, where the source reaches
     their middles.
     """
-    standing = obstacles(scene.bodies, source)
+    soup = soup_of(scene)
     parts: list[Candidates] = []
     for number, body in enumerate(scene.bodies):
         geometry = body.geometry
         if isinstance(geometry, Mesh):
-            parts.append(_mesh(scene, geometry, source, epsilon or EPSILON * curve(geometry)[1]))
+            parts.append(_mesh(scene, soup, number, source, epsilon or EPSILON * curve(geometry)[1]))
             continue
         edges = _great_circle(geometry, source) if isinstance(geometry, Sphere) else _rims(geometry, source)
-        own = np.full(len(edges.start), number)
-        parts.append(_taken(edges, ~hidden(standing, source, Queries(_middle(edges), own, edges.faces))))
+        parts.append(edges)
     if not any(len(part.start) for part in parts):
         return Outline.empty()
     edges = Candidates.concatenate(parts)
     body = np.repeat(np.arange(len(parts)), [len(part.start) for part in parts])
-    whole = Stretches.whole(len(body))
-    return assemble(edges, body, whole, gap_behind(standing, source, edges, body, whole), source, 0.0)
-
-
-def _middle(edges: Candidates) -> Reals:
-    return 0.5 * (edges.start + edges.end)
-
-
-def _taken(edges: Candidates, which: NDArray[np.bool_]) -> Candidates:
-    return Candidates(edges.start[which], edges.end[which], edges.normals[which], edges.edge[which], edges.faces[which])
+    sight = sight_of(scene.bodies, soup, source, edges, body)
+    by_middle = np.flatnonzero(edges.edge < 0)
+    dark = by_middle[sight.hidden(by_middle, np.full(len(by_middle), 0.5))]
+    whole = Stretches.whole(len(body))[np.delete(np.arange(len(body)), dark)]
+    return assemble(edges, body, whole, source, 0.0, sight=sight)
 
 
 def _great_circle(sphere: Sphere, source: Source) -> Candidates:
@@ -81,17 +75,19 @@ def _rims(shape: Disk | Cylinder, source: Source) -> Candidates:
     return disk.silhouette(shape, source, curve(shape)[1] * SAG)
 
 
-def _mesh(scene: Scene, mesh: Mesh, source: Source, epsilon: float) -> Candidates:
-    points, faces = weld(mesh)
-    whole = has_corners(faces)
-    index, faces = np.flatnonzero(whole), faces[whole]
+def _mesh(scene: Scene, soup: Soup, number: int, source: Source, epsilon: float) -> Candidates:
+    mesh = scene.bodies[number].geometry
+    index = np.arange(soup.first[number], soup.first[number + 1])
+    index = index[soup.has_corners[index]]
+    faces = soup.corners[:, index].T
     ends = np.sort(np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
     order = np.lexsort((ends[:, 1], ends[:, 0]))
     first = np.flatnonzero(np.append(True, (np.diff(ends[order], axis=0) != 0).any(axis=1)))
     count = np.diff(np.append(first, len(order)))
-    start, end = np.moveaxis(points[ends[order[first]]], 1, 0)
-    face1 = order[first] // 3
-    face2 = np.where(count > 1, order[np.minimum(first + 1, len(order) - 1)] // 3, -1)
+    start, end = (soup.points[:, of].T for of in ends[order[first]].T)
+    face1 = index[order[first] // 3]
+    face2 = np.where(count > 1, index[order[np.minimum(first + 1, len(order) - 1)] // 3], -1)
+    edge = 3 * (face1 - soup.first[number]) + order[first] % 3
 
     out = np.cross(end - start, -toward(source, 0.5 * (start + end)))
     length, deep = np.linalg.norm(out, axis=1, keepdims=True), DEEP * curve(mesh)[1]
@@ -101,10 +97,9 @@ def _mesh(scene: Scene, mesh: Mesh, source: Source, epsilon: float) -> Candidate
     # the body on the left of the edge, seen along the light
     start, end = np.where(plus[:, None], start, end)[found], np.where(plus[:, None], end, start)[found]
     face1, face2 = face1[found], face2[found]
-    normals, swap = normals_beside(points, faces, source, start, face1, face2)
+    normals, swap = normals_beside(soup, source, start, face1, face2)
     face1, face2 = np.where(swap, face2, face1), np.where(swap, face1, face2)
-    beside = np.stack([index[face1], np.where(face2 >= 0, index[face2], -1)], axis=1)
-    return Candidates(start, end, normals, np.flatnonzero(found), beside)
+    return Candidates(start, end, normals, edge[found], np.stack([face1, face2], axis=1))
 
 
 def _passes(scene: Scene, source: Source, x: Reals, deep: float) -> NDArray[np.bool_]:

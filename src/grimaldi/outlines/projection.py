@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from grimaldi.outlines.hidden import view
 from grimaldi.outlines.model import Reals
+from grimaldi.outlines.view import seen
 from grimaldi.scene.model import Source
 
 WIDEST = np.radians(75)  # from the axis; further out a gnomonic picture is stretched beyond use
@@ -30,11 +30,11 @@ class Projection:
 
     def __call__(self, points: Reals) -> Reals:
         """Picture coordinates (..., 2) of points (..., 3)."""
-        seen = view(self.source, points)
-        across = np.stack([seen @ self.right, seen @ self.up], axis=-1)
+        at = seen(self.source, points)
+        across = np.stack([at @ self.right, at @ self.up], axis=-1)
         if self.kind == "parallel":
             return across
-        along = (seen @ self.axis)[..., None]
+        along = (at @ self.axis)[..., None]
         if self.kind == "gnomonic":
             return across / along
         sine = np.linalg.norm(across, axis=-1, keepdims=True)
@@ -45,11 +45,11 @@ def projection(source: Source, points: Reals) -> Projection:
     """The projection that suits `source` and what it is to show, `points` (n, 3)."""
     if source.direction is not None:
         return _upright("parallel", source, source.direction)
-    seen = view(source, points)
-    mean = seen.mean(axis=0)
+    at = seen(source, points)
+    mean = at.mean(axis=0)
     length = np.linalg.norm(mean)
     axis = mean / length if length > 1e-6 else np.array([1.0, 0.0, 0.0])
-    wide = (seen @ axis).min(initial=1.0) < np.cos(WIDEST)
+    wide = (at @ axis).min(initial=1.0) < np.cos(WIDEST)
     return _upright("azimuthal equidistant" if wide else "gnomonic", source, axis)
 
 

@@ -50,7 +50,7 @@ def sort_shapes(shapes: Iterable[Any]) -> Shapes:
     Opaque is a mesh, sphere, disk or cylinder whose BSDF transmits nothing and that bounds no medium.
 
     Raises:
-        InputError: an aperture that is no rectangle, disk or planar mesh.
+        InputError: an aperture that is no rectangle, disk or planar mesh; an instance.
     """
     surfaces: list[Geometry | None] = []
     bodies: list[Body] = []
@@ -58,6 +58,10 @@ def sort_shapes(shapes: Iterable[Any]) -> Shapes:
     others: list[str] = []
     for index, shape in enumerate(shapes):
         name = shape.id() or f"{shape.class_name()} {index}"
+        if shape.class_name() == "Instance":  # those of files and dictionaries are written out before
+            raise InputError(
+                f"{name}: an instance tells nothing of its shapes here; load the scene's file or dictionary"
+            )
         surface = _geometry(shape)
         surfaces.append(surface)
         if is_aperture(shape):

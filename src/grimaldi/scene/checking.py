@@ -20,10 +20,11 @@ from grimaldi.scene.polygons import check_obj
 from grimaldi.scene.screen import check_aperture, check_screen
 from grimaldi.scene.serialized import check_serialized
 from grimaldi.scene.sources import ZERO_DIRECTION
-from grimaldi.scene.triangles import LARGEST, check_positions, check_triangles
+from grimaldi.scene.triangles import LARGEST, check_positions, check_triangles, merged_points
 
 Reals = NDArray[np.float64]
 
+SOME = 4096  # faces at once: nearly always the first have an area
 LARGEST_FILM = 2**28  # pixels; far beyond it Mitsuba counts wrongly, and says nothing
 
 
@@ -135,8 +136,11 @@ def _check_body(body: Body) -> None:
 
 
 def _check_area(mesh: Mesh, name: str) -> None:
-    a, b, c = np.moveaxis(mesh.vertices[mesh.faces], 1, 0)
-    if not np.cross(b - a, c - a).any():
+    for first in range(0, len(mesh.faces), SOME):
+        a, b, c = np.moveaxis(mesh.vertices[mesh.faces[first : first + SOME]], 1, 0)
+        if np.cross(b - a, c - a).any():
+            break
+    else:
         raise InputError(f"{name}: all faces have zero area; give a scale that is nowhere 0, or export the mesh anew")
 
 
@@ -154,15 +158,19 @@ def _check_radius(radius: float, place: str, shape: str = "sphere") -> None:
 
 def _warn_of_shared_edges(mesh: Mesh, name: str) -> None:
     """Names the first edge that more than two faces meet at."""
-    _, vertex = np.unique(mesh.vertices + 0.0, axis=0, return_inverse=True)  # + 0.0: -0 is 0
-    corners = vertex.reshape(-1)[mesh.faces]
-    edges = np.sort(np.concatenate([corners[:, [0, 1]], corners[:, [1, 2]], corners[:, [2, 0]]]), axis=1)
-    key = edges[:, 0] * len(vertex) + edges[:, 1]
-    _, first, count = np.unique(key[edges[:, 0] != edges[:, 1]], return_index=True, return_counts=True)
+    points = np.ascontiguousarray(mesh.vertices.T + 0.0)  # + 0.0: -0 is 0
+    _, vertex = merged_points(points, np.zeros(len(mesh.vertices), np.int64))
+    tail, head = vertex[mesh.faces.T], vertex[np.roll(mesh.faces, -1, axis=1).T]
+    edges = np.minimum(tail, head) * len(vertex) + np.maximum(tail, head)
+    edges[tail == head] = -1 - np.flatnonzero(tail == head)  # no edge
+    key = np.sort(edges, axis=None)
+    if (key[2:] != key[:-2]).all():
+        return
+    _, first, count = np.unique(edges, return_index=True, return_counts=True)
     shared = np.flatnonzero(count > 2)
     if len(shared):
-        sides = np.concatenate([mesh.faces[:, [0, 1]], mesh.faces[:, [1, 2]], mesh.faces[:, [2, 0]]])
-        ends = mesh.vertices[sides[edges[:, 0] != edges[:, 1]][first[shared[0]]]]
+        side, face = np.divmod(first[shared[0]], len(mesh.faces))
+        ends = mesh.vertices[mesh.faces[face, [side, (side + 1) % 3]]]
         start, end = (f"({', '.join(f'{x:g}' for x in point)})" for point in ends)
         more = f", as are {len(shared) - 1} more edges" if len(shared) > 1 else ""
         warnings.warn(

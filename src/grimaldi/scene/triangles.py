@@ -12,6 +12,9 @@ from grimaldi.errors import InputError
 LARGEST = 1e18  # beyond it squared distances overflow in Float32
 
 
+_ODD = (0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9, 0x27D4EB2F165667C5)  # they spread keys evenly
+
+
 def check_triangles(positions: NDArray[np.floating], faces: NDArray[np.integer], place: str) -> None:
     """Raises InputError naming the first vertex (n, 3) or face (m, 3) that Mitsuba cannot take.
 
@@ -71,3 +74,30 @@ def as_mesh(
     values["faces"] = V.UInt32(faces.astype(np.uint32).ravel())
     values.update()
     return mesh
+
+
+def merged_points(points: NDArray[np.float64], owner: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Of points (3, n) one of each that are equal in all bits and have the same owner (n,), and which (n,) that is.
+
+    Of -0.0 and 0.0 one only must occur. They are found by a hash; should two different points have the same one, by
+    sorting their coordinates instead.
+    """
+    keys = [*points.view(np.uint64), owner.astype(np.uint64)]
+    hashed = np.zeros(len(owner), np.uint64)
+    for key, odd in zip(keys, _ODD, strict=True):
+        hashed = (hashed ^ key) * np.uint64(odd)
+        hashed ^= hashed >> np.uint64(29)
+    order = np.argsort(hashed)
+    new = hashed[order][1:] != hashed[order][:-1]
+    differ = np.zeros(max(len(owner) - 1, 0), bool)
+    for key in keys:
+        differ |= key[order][1:] != key[order][:-1]
+    if (differ != new).any():
+        order = np.lexsort(keys)
+        new = np.zeros(len(new), bool)
+        for key in keys:
+            new |= key[order][1:] != key[order][:-1]
+    leads = np.append(True, new)[: len(owner)]
+    number = np.empty(len(owner), np.int64)
+    number[order] = np.cumsum(leads) - 1
+    return order[leads], number

@@ -1,0 +1,85 @@
+"""The triangles of all meshes of a scene as one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from grimaldi.outlines.model import Integers, Reals
+from grimaldi.scene.model import Body, Mesh
+from grimaldi.scene.triangles import merged_points
+
+
+@dataclass(frozen=True, eq=False)
+class Soup:
+    """Triangles of several bodies, whose vertices are merged by position within each body.
+
+    Coordinates lie apart, (3, n), and corners too, (3, m): all that runs over every triangle is bound by memory.
+    """
+
+    points: Reals  # (3, n)
+    corners: Integers  # (3, m) indices of points
+    body: Integers  # (m,) of each triangle, rising
+    first: Integers  # (bodies + 1,) each body's first triangle; as long as there are bodies, meshes or not
+
+    @staticmethod
+    def of(bodies: Sequence[Body]) -> Soup:
+        """All triangles of the bodies that are meshes, in their order."""
+        meshes = [(i, body.geometry) for i, body in enumerate(bodies) if isinstance(body.geometry, Mesh)]
+        n_points = [len(mesh.vertices) for _, mesh in meshes]
+        n_faces = np.zeros(len(bodies), np.int64)
+        n_faces[[i for i, _ in meshes]] = [len(mesh.faces) for _, mesh in meshes]
+        offset = np.cumsum([0, *n_points])
+        points = np.concatenate([np.empty((0, 3)), *(mesh.vertices for _, mesh in meshes)]).T + 0.0  # -0.0 becomes 0.0
+        corners = np.empty((3, n_faces.sum()), np.int64)
+        first = np.append(0, np.cumsum(n_faces))
+        for (i, mesh), start in zip(meshes, offset[:-1], strict=True):
+            np.add(mesh.faces.T, start, out=corners[:, first[i] : first[i + 1]])
+        owner = np.repeat(np.array([i for i, _ in meshes], np.int64), n_points)
+        kept, number = merged_points(np.ascontiguousarray(points), owner)
+        if len(kept) == points.shape[1]:
+            kept, number = np.arange(len(kept)), np.arange(len(kept))
+        return Soup(
+            np.ascontiguousarray(points[:, kept]), number[corners], np.repeat(np.arange(len(bodies)), n_faces), first
+        )
+
+    def __len__(self) -> int:
+        return self.corners.shape[1]
+
+    def triangles(self, which: Integers) -> Reals:
+        """Corners (3 coordinates, 3 corners, k) of some triangles."""
+        return self.points.take(self.corners.take(which, axis=1), axis=1)
+
+    @cached_property
+    def has_corners(self) -> NDArray[np.bool_]:
+        """Whether triangles (m,) join three different points."""
+        a, b, c = self.corners
+        return (a != b) & (b != c) & (c != a)
+
+    @cached_property
+    def at_border(self) -> NDArray[np.bool_]:
+        """Whether points (n,) end an edge that is not shared by just two triangles of opposite winding."""
+        n = self.points.shape[1]
+        ends = [(self.corners[i][self.has_corners], self.corners[i - 2][self.has_corners]) for i in range(3)]
+        # an edge's key is even one way round and odd the other, next to it when sorted
+        keys = np.sort(np.concatenate([(np.minimum(a, b) * n + np.maximum(a, b)) * 2 + (a > b) for a, b in ends]))
+        first = np.flatnonzero(np.append(True, np.diff(keys >> 1) != 0)[: len(keys)])
+        count = np.diff(np.append(first, len(keys)))
+        pair = (count == 2) & (keys[np.minimum(first + 1, len(keys) - 1)] != keys[first])
+        odd = keys[first[~pair]] >> 1
+        result = np.zeros(n, bool)
+        result[odd // max(n, 1)] = True
+        result[odd % max(n, 1)] = True
+        return result
+
+
+def grouped(numbers: Integers) -> Iterator[tuple[int, Integers]]:
+    """Each number that occurs among numbers (n,), and where it does."""
+    order = np.argsort(numbers, kind="stable")
+    first = np.flatnonzero(np.append(True, np.diff(numbers[order]) != 0)[: len(order)])
+    for begin, end in zip(first, np.append(first[1:], len(order)), strict=False):
+        yield int(numbers[order[begin]]), order[begin:end]
