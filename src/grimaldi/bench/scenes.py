@@ -54,8 +54,8 @@ def bodies(n: int, *, seed: int = 0, size: int = 256, spp: int = 4, joined: bool
 def box(split: int, *, seed: int = 0, size: int = 256, spp: int = 4) -> dict[str, Any]:
     """A turned box of 12 split² triangles over the floor: whatever `split`, its outline is the same six lines."""
     vertices, faces = divided(*_cuboid(), split)
-    turned = vertices * [2.0, 1.5, 1.0] @ rotations(1, seed)[0].T
-    return _over_floor({"box": _mesh("box", turned, faces)}, 3.0, size, spp)
+    turned = vertices * [4.0, 3.0, 2.0] @ rotations(1, seed)[0].T
+    return _over_floor({"box": _mesh("box", turned, faces)}, 2.7, size, spp)
 
 
 def floor_points(n: int, seed: int = 0) -> Reals:
