@@ -63,7 +63,6 @@ def peaks(number: int, films: Sequence[int], settings: Settings, patience: float
         f"{number:,} bodies in one mesh over a floor, in one plane wave, tolerance {TOLERANCE:g}: a process that loads "
         "the scene and renders it once, its largest resident size, and the seconds of the rendering."
     )
-    largest = f"{films[-1]}² pixels"
     film = f"{films[-1]}² pixels"
     targets = (
         Target(film, max(last) if both else None, MOST, "GB"),
