@@ -39,10 +39,10 @@ def growth(numbers: Sequence[int], film: Film, small: Film, runs: int, patience:
             line, alone[n], times[n] = _one(n, film, small, runs)
             lines.append(line)
     text = (
-        "Bodies of 500 triangles and about 33 silhouette edges, each its own shape of radius 1, one to 16 "
-        f"square units of a layer 10 above a floor, in one plane wave of λ = {WAVELENGTH:g}. The camera sees 16² of the floor "
-        f"under the middle of the layer, at {film}. Times include outlines and visibility, not loading. Errors are as "
-        f"of killeroo, measured at {small}, and tolerances the loosest that keep them within {ALLOWED:.0%}."
+        "Bodies of 500 triangles and about 33 silhouette edges, each its own shape of radius 1, one to 16 square units "
+        f"of a layer 10 above a floor, in one plane wave of λ = {WAVELENGTH:g}. The camera sees 16² of the floor under "
+        f"the middle of the layer, at {film}. Times include outlines and visibility, not loading. Errors are as of "
+        f"killeroo, measured at {small}, and tolerances the loosest that keep them within {ALLOWED:.0%}."
     )
     figure = f"exponent from {numbers[-3]:,} to {numbers[-1]:,} bodies"
     return Result(text, tuple(lines), (Target(figure, _slope(times, numbers[-3], numbers[-1]), MOST),))

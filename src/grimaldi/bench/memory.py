@@ -47,14 +47,14 @@ def peaks(number: int, films: Sequence[int], settings: Settings, patience: float
             if expected > patience:
                 lines.append(_line(size, spp, time=f"left out: at most {expected:.2g} s expected"))
                 continue
-            peak = found[size, spp] = _child(size, spp, number, settings.seed)
+            took = found[size, spp] = _child(size, spp, number, settings.seed)
             lines.append(
                 _line(
                     size,
                     spp,
-                    segments=f"{peak.segments:,}",
-                    memory=f"{peak.memory:.2f} GB",
-                    time=written(peak.time),
+                    segments=f"{took.segments:,}",
+                    memory=f"{took.memory:.2f} GB",
+                    time=written(took.time),
                 )
             )
     last = [found[films[-1], spp].memory for spp in SAMPLES if (films[-1], spp) in found]
@@ -89,7 +89,7 @@ def _child(size: int, spp: int, number: int, seed: int) -> Peak:
     return Peak(**json.loads(done.stdout.splitlines()[-1]))
 
 
-def _peak() -> float:
+def peak() -> float:
     """The largest resident size of this process so far [GB]."""
     import resource
 
@@ -112,7 +112,7 @@ def main() -> None:
     ensure_variant("rgb")
     scene = grimaldi.load(bodies(number, seed=seed, size=size, spp=spp, joined=True))
     _, time = timed(lambda: grimaldi.render(scene, wavelength=WAVELENGTH, seed=seed, tolerance=TOLERANCE))
-    memory = _peak()
+    memory = peak()  # before the outline is found once more
     print(json.dumps(Peak(memory, time, len(grimaldi.outline(scene)))._asdict()))
 
 

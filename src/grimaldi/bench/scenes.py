@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from grimaldi.scene.builtin.bench import film, transform
 from grimaldi.scene.triangles import as_mesh
+from grimaldi.variants import ensure_variant
 
 Reals = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -126,6 +127,7 @@ def _mesh(name: str, vertices: Reals, faces: Integers) -> Any:
     """A Mitsuba mesh of the current variant, grey."""
     import mitsuba as mi
 
+    ensure_variant("rgb")
     properties = mi.Properties()
     properties["bsdf"] = mi.load_dict({"type": "diffuse"})
     return as_mesh(mi, name, vertices, faces, properties)

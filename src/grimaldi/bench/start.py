@@ -8,6 +8,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from grimaldi.bench.model import Result, Settings, Target
@@ -23,17 +24,19 @@ def measure(settings: Settings) -> Result:
     return first_pictures(SCENES, 128, settings)
 
 
-def first_pictures(scenes: tuple[str, ...], size: int, settings: Settings) -> Result:
-    """The command's seconds for size × size pixels of one sample, as a process."""
+def first_pictures(scenes: Sequence[str], size: int, settings: Settings) -> Result:
+    """The command's seconds for size × size pixels of one sample, as a process; and of `--help`, for comparison."""
     lines, targets = [], []
     for scene in scenes:
         runs = [_cold_and_warm(scene, size, settings.seed) for _ in range(settings.runs)]
         cold, warm = map(statistics.median, zip(*runs, strict=True))
-        lines.append({"scene": scene, "empty cache": written(cold), "full cache": written(warm)})
+        lines.append({"": scene, "empty cache": written(cold), "full cache": written(warm)})
         targets += [
             Target(f"{scene}, empty cache", cold, COLD, "s"),
             Target(f"{scene}, full cache", warm, WARM, "s"),
         ]
+    aid = statistics.median(_command(["--help"], os.environ) for _ in range(settings.runs))
+    lines.append({"": "`--help`", "empty cache": "-", "full cache": written(aid)})
     text = (
         f"`grimaldi render SCENE --size {size}x{size} --spp 1 -o OUT.png` as a process: start of Python, loading, "
         "compiling and writing included, at the default tolerance of 1e-3. The cache is Dr.Jit's, a new folder each "
@@ -47,15 +50,12 @@ def _cold_and_warm(scene: str, size: int, seed: int) -> tuple[float, float]:
         cache, out = Path(folder, "cache"), Path(folder, "out.png")
         cache.mkdir()
         words = ["render", scene, "--size", f"{size}x{size}", "--spp", "1", "--seed", str(seed), "-o", str(out)]
+        environment = {**os.environ, "DRJIT_CACHE_DIR": str(cache)}
+        return _command(words, environment), _command(words, environment)
 
-        def once() -> float:
-            begun = time.perf_counter()
-            subprocess.run(
-                [sys.executable, "-m", "grimaldi", *words],
-                check=True,
-                capture_output=True,
-                env={**os.environ, "DRJIT_CACHE_DIR": str(cache)},
-            )
-            return time.perf_counter() - begun
 
-        return once(), once()
+def _command(words: Sequence[str], environment: Mapping[str, str]) -> float:
+    """The seconds of `grimaldi` with these words."""
+    begun = time.perf_counter()
+    subprocess.run([sys.executable, "-m", "grimaldi", *words], check=True, capture_output=True, env=environment)
+    return time.perf_counter() - begun
