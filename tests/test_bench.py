@@ -96,8 +96,8 @@ def test_a_row_without_its_data_says_so(tmp_path):
     assert isinstance(missing, Skipped)
     assert "give its folder by --data" in missing.why
     assert pairs._hand_written(None, 10) == "not run: roofline.cpp is not at hand"
-    found = planar._elsewhere(Settings(runs=1), "import no_such_library", 8, np.arange(3))
-    assert found == "not run: ModuleNotFoundError: No module named 'no_such_library'"
+    with pytest.raises(planar.Absent, match="No module named 'no_such_library'"):
+        planar.Other(sys.executable, "import no_such_library", 8, tmp_path)
 
 
 def test_verdicts():
@@ -218,9 +218,25 @@ def test_bodies_joined_or_not_cast_the_same_edges():
     assert len(edges[0]) / 6 == pytest.approx(33, rel=0.2)
 
 
+def test_another_library_takes_its_turns_at_the_same_points(tmp_path):
+    """Whose phase is compared but for a constant: here the plain script itself, turned by a quarter."""
+    script = "from grimaldi.bench.planar import plain\ndef run():\n    return 1j * plain(a, z, wavelength, x, 1e-9)\n"
+    side, points = planar.square(8)
+    exact = planar.plain(planar.RADIUS, planar.DISTANCE, planar.WAVELENGTH, side, 1e-9).ravel()
+    other = planar.Other(sys.executable, script, 8, tmp_path)
+    try:
+        seconds, errors = planar._in_turn({"other": other}, 2, np.arange(64), exact)
+    finally:
+        other.close()
+    assert points.shape == (64, 3)
+    assert seconds["other"] > 0
+    assert errors["other"] < 1e-12
+    assert planar._error(1j * exact, exact, turned=False) > 1
+
+
 def test_the_plain_script_is_fresnels_integral_on_the_axis():
     a, z, wavelength = planar.RADIUS, planar.DISTANCE, planar.WAVELENGTH
-    side, _ = planar._square(a, 16)
+    side, _ = planar.square(16)
     u = planar.plain(a, z, wavelength, side, 1e-9)
     assert side[8] == 0
     assert abs(u[8, 8]) == pytest.approx(abs(circle.fresnel(a, z, wavelength)), abs=1e-8)

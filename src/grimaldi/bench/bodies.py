@@ -23,7 +23,7 @@ def measure(settings: Settings) -> Result:
 
 
 def growth(numbers: Sequence[int], film: Film, small: Film, runs: int, patience: float = PATIENCE) -> Result:
-    """Times on `film` for each number of bodies; tolerance and error on the `small` one.
+    """Times on `film` for each of at least three numbers of bodies; tolerance and error on the `small` one.
 
     A picture that is expected to take longer than `patience` [s] is left out: by the power of the number that its time
     grew with before, or in proportion to it.
