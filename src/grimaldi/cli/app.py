@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from grimaldi import __version__
-from grimaldi.cli import doctor, field, figures, outline, render, validate
+from grimaldi.cli import bench, doctor, field, figures, outline, render, validate
 
 
 def _version(asked: bool) -> None:
@@ -38,4 +38,5 @@ app.command("field")(field.field)
 app.command("outline")(outline.outline)
 app.command("figures")(figures.figures)
 app.command("validate")(validate.validate)
+app.command("bench")(bench.bench)
 app.command("doctor")(doctor.doctor)

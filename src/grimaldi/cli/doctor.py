@@ -11,6 +11,8 @@ from pathlib import Path
 
 import typer
 
+from grimaldi.machine import processor
+
 
 def doctor() -> None:
     """Say what is installed, what is wrong, and what mends it."""
@@ -18,7 +20,7 @@ def doctor() -> None:
     _line("grimaldi", metadata.version("grimaldi"))
     _line("python", f"{platform.python_version()} ({sys.executable})")
     _line("system", f"{platform.system()} {platform.machine()}: {_support()}")
-    _line("CPU", f"{_processor()}, {os.cpu_count()} threads")
+    _line("CPU", f"{processor()}, {os.cpu_count()} threads")
     if not problems:  # with the wrong packages, importing Mitsuba may well end the process
         problems += _back_ends()
     for problem in problems:
@@ -91,13 +93,3 @@ def _loaded_libllvm() -> str:
             if "libLLVM" in path:
                 return path
     return os.environ.get("DRJIT_LIBLLVM_PATH", "found by Dr.Jit")
-
-
-def _processor() -> str:
-    """The processor's name."""
-    info = Path("/proc/cpuinfo")
-    if info.exists():
-        for line in info.read_text().splitlines():
-            if line.startswith("model name"):
-                return line.partition(":")[2].strip()
-    return platform.processor() or "unknown"

@@ -1,0 +1,34 @@
+"""Seconds: medians of runs that take turns, so that a busy machine slows all alike."""
+
+from __future__ import annotations
+
+import statistics
+import time
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+T = TypeVar("T")
+
+
+def timed(work: Callable[[], T]) -> tuple[T, float]:
+    """What `work` returns, and the seconds that it takes, Dr.Jit's kernels included."""
+    import drjit as dr
+
+    dr.sync_thread()
+    begun = time.perf_counter()
+    value = work()
+    dr.sync_thread()
+    return value, time.perf_counter() - begun
+
+
+def medians(runs: int, *works: Callable[[], Any]) -> tuple[float, ...]:
+    """The median seconds of each of `works`, run in turn; once more each at first, untimed, to compile kernels."""
+    for work in works:
+        work()
+    times = [[timed(work)[1] for work in works] for _ in range(runs)]
+    return tuple(map(statistics.median, zip(*times, strict=True)))
+
+
+def written(value: float) -> str:
+    """A time as a table shows it."""
+    return f"{value:.3g} s"

@@ -1,0 +1,250 @@
+"""`grimaldi bench`: the command as a process, the page that it writes, its scenes, and how it judges."""
+
+from __future__ import annotations
+
+import math
+import signal
+import subprocess
+import sys
+from importlib import import_module
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import grimaldi
+from grimaldi.bench import ROWS, bodies, chosen, error, killeroo, pairs, planar, report, scenes
+from grimaldi.bench.error import TOLERANCES, Film
+from grimaldi.bench.model import Result, Settings, Skipped, Target
+from grimaldi.bench.timing import medians
+from grimaldi.errors import InputError
+from grimaldi.outlines.extract import edges_of
+from grimaldi.reference import circle
+
+QUICK = ["--quick", "--runs", "1"]
+RESULT = Result(
+    "Said.", ({"": "a|b", "time": "1 s"},), (Target("ratio", 4.0, 5.0, "×"), Target("peak", None, 4.0, "GB"))
+)
+
+
+def command(*arguments: str | Path, cwd: Path) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "grimaldi", "bench", *map(str, arguments)], capture_output=True, text=True, cwd=cwd
+    )
+
+
+def test_the_command_prints_its_rows_and_writes_the_page(tmp_path):
+    done = command(*QUICK, "--only", "wavelength,triangles", "-o", tmp_path, cwd=tmp_path)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.splitlines()[-1] == str(tmp_path / "performance.md")
+    page = (tmp_path / "performance.md").read_text()
+    for name in ("triangles", "wavelength"):
+        assert page.count(f"## {name}: {ROWS[name]}\n") == 1
+        assert f"## {name}: {ROWS[name]}\n" in done.stdout
+    assert "--quick" in page
+    assert "reached" not in page  # small sizes show nothing of what is to be reached
+    for fact in ("CPU", "Python", "mitsuba", "LLVM", "variant", "date"):
+        assert f"| {fact} | " in page
+    assert [path.name for path in tmp_path.iterdir()] == ["performance.md"]
+
+
+def test_the_list_measures_nothing(tmp_path):
+    done = command("--list", cwd=tmp_path)
+    assert done.returncode == 0
+    assert [line.split()[0] for line in done.stdout.splitlines()] == [*ROWS]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (["--only", "kileroo"], "row: there is no 'kileroo'; did you mean 'killeroo'?"),
+        (["--runs", "0"], "--runs: 0 is out of reach; give a number from 1 to 1000"),
+        (["--seed", "-1"], "--seed: -1 is out of reach; give a number from 0 to 4294967295"),
+        (["-o", "nowhere"], "nowhere: is no folder; make it first"),
+        (["--data", "nowhere"], "--data: nowhere is no folder; name the one that has scenes/killeroo.xml in it"),
+        (["--peers", "nowhere"], "--peers: nowhere is no program; name a Python that has LightPipes or diffractio"),
+    ],
+)
+def test_wrong_input_is_one_line(arguments, says, tmp_path):
+    done = command(*arguments, cwd=tmp_path)
+    assert (done.returncode, done.stdout, done.stderr) == (2, "", f"grimaldi: {says}\n")
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no SIGINT to send to another process")
+def test_an_interrupted_run_leaves_nothing(tmp_path):
+    words = [sys.executable, "-m", "grimaldi", "bench", *QUICK, "--only", "wavelength,start", "-o", tmp_path]
+    running = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    assert running.stdout is not None
+    assert running.stdout.readline().startswith("## wavelength")  # the next row runs now
+    running.send_signal(signal.SIGINT)
+    _, errors = running.communicate(timeout=60)
+    assert (running.returncode, errors) == (130, "grimaldi: interrupted\n")
+    assert not list(tmp_path.iterdir())
+
+
+def test_every_row_is_a_module_that_measures():
+    for name in ROWS:
+        assert callable(import_module(f"grimaldi.bench.{name}").measure)
+    assert chosen([]) == tuple(ROWS)
+    assert chosen(["pairs", "killeroo"]) == ("killeroo", "pairs")
+    with pytest.raises(InputError, match="did you mean 'memory'"):
+        chosen(["memroy"])
+
+
+def test_a_row_without_its_data_says_so(tmp_path):
+    missing = killeroo.measure(Settings(data=tmp_path))
+    assert isinstance(missing, Skipped)
+    assert "give its folder by --data" in missing.why
+    assert pairs._hand_written(None, 10) == "not run: roofline.cpp is not at hand"
+    with pytest.raises(planar.Absent, match="No module named 'no_such_library'"):
+        planar.Other(sys.executable, "import no_such_library", 8, tmp_path)
+
+
+def test_verdicts():
+    assert Target("x", 5.0, 5.0).verdict == "reached"
+    assert Target("x", 5.1, 5.0).verdict == "MISSED"
+    assert Target("x", math.nan, 5.0).verdict == "MISSED"
+    assert Target("x", None, 5.0).verdict == "not measured"
+
+
+def test_the_page_says_what_is_reached_and_what_was_left_out():
+    rows = {"killeroo": Skipped("no data"), "memory": RESULT}
+    page = report.page(rows, Settings(seed=3, runs=7), {"CPU": "some"})
+    lines = page.splitlines()
+    assert "medians of 7 runs" in page
+    assert "`--seed 3`" in page
+    assert "--quick" not in page
+    assert "Not measured: no data." in lines
+    assert "| a\\|b | 1 s |" in lines
+    (ratio, peak) = (line for line in lines if line.startswith("| [memory](#"))
+    assert ratio.endswith("| ratio | 4× | ≤ 5× | reached |")
+    assert peak.endswith("| peak | - | ≤ 4 GB | not measured |")
+    assert "](#memory-peak-memory-of-a-picture-of-4096²-pixels-with-1e5-segments)" in ratio
+
+
+def test_runs_take_turns_after_one_untimed():
+    order: list[str] = []
+    first, second = medians(2, lambda: order.append("a"), lambda: order.append("b"))
+    assert order == ["a", "b"] * 3
+    assert first >= 0
+    assert second >= 0
+
+
+@pytest.mark.parametrize("share", [0.02, 1.0, 30.0, 1e3])
+def test_the_tolerance_is_the_loosest_whose_error_is_allowed(share, monkeypatch):
+    """Of pictures that err by `share` times the tolerance, relative to what diffraction changes."""
+
+    def picture(scene, wavelength, film, tolerance=0.0, diffraction="boundary"):
+        change = 0.0 if diffraction == "none" else 2.0 + 2.0 * share * (tolerance - error.REFERENCE)
+        return np.full((4, 4, 3), 5.0 + change)
+
+    monkeypatch.setattr(error, "picture", picture)
+    found = error.loosest(None, 1.0, Film(4, 1, 0))  # type: ignore[arg-type]
+    errors = [share * (tolerance - error.REFERENCE) for tolerance in TOLERANCES]
+    allowed = [tolerance for tolerance, e in zip(TOLERANCES, errors, strict=True) if e <= error.ALLOWED]
+    assert found.tolerance == max(allowed, default=TOLERANCES[-1])
+    assert found.error == pytest.approx(share * (found.tolerance - error.REFERENCE))
+
+
+def test_the_exponent_is_that_of_a_power_law():
+    times = {n: 3 * n**0.4 for n in (10, 100, 1000)}
+    assert bodies._slope(times, 100, 1000) == pytest.approx(0.4)
+    assert bodies._slope(times, 100, 10_000) is None
+    assert bodies._expected(times, 10_000) == pytest.approx(3 * 10_000**0.4)
+    assert bodies._expected({10: 2.0}, 100) == pytest.approx(20)  # in proportion, while nothing else is known
+
+
+@pytest.mark.filterwarnings("ignore:.*alias:grimaldi.errors.GrimaldiWarning")
+def test_a_picture_that_would_take_too_long_is_left_out():
+    result = bodies.growth((1, 2, 3), Film(8, 1, 0), Film(8, 1, 0), runs=1, patience=1e-9)
+    assert [line["time"].startswith("left out") for line in result.lines] == [False, True, True]
+    assert result.targets[0].verdict == "not measured"
+
+
+def test_bodies_are_apart_of_one_density_and_the_same_whatever_their_number():
+    few, many = scenes.layer(100, 5), scenes.layer(2000, 5)
+    np.testing.assert_array_equal(few, many[:100])
+    assert not np.array_equal(few, scenes.layer(100, 6))
+    distance = np.linalg.norm(many[:, None] - many[None], axis=2) + np.diag(np.full(2000, np.inf))
+    assert distance.min() > 2 * scenes.RADIUS
+    for radius in (30.0, 60.0):
+        count = (np.linalg.norm(many[:, :2], axis=1) < radius).sum()
+        assert count == pytest.approx(np.pi * radius**2 / scenes.CELL, rel=0.03)
+
+
+def test_turns_are_rotations():
+    turns = scenes.rotations(50, 1)
+    np.testing.assert_allclose(
+        np.einsum("nij,nkj->nik", turns, turns), np.broadcast_to(np.eye(3), (50, 3, 3)), atol=1e-12
+    )
+    np.testing.assert_allclose(np.linalg.det(turns), 1, atol=1e-12)
+
+
+@pytest.mark.parametrize("split", [1, 2, 5])
+def test_divided_meshes_are_closed_and_keep_their_shape(split):
+    """Euler: V - E + F = 2, each edge at two faces; the box keeps its volume, the sphere tends to 4π/3."""
+    for points, faces in (scenes.divided(*scenes._cuboid(), split), scenes.icosphere(split)):
+        edges = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
+        edges, count = np.unique(edges, axis=0, return_counts=True)
+        assert (count == 2).all()
+        assert len(points) - len(edges) + len(faces) == 2
+        volume = np.linalg.det(points[faces]).sum() / 6
+        if len(faces) == 12 * split**2:
+            assert volume == pytest.approx(1)
+        else:
+            assert len(faces) == 20 * split**2
+            assert 0 < 4 * np.pi / 3 - volume < 2.5 / split**2  # inscribed: less by the square of the edges
+
+
+def test_the_box_has_one_outline_however_finely_it_is_meshed():
+    lengths = []
+    for split in (1, 4, 16):
+        loaded = grimaldi.load(scenes.box(split, seed=2))
+        edges, body = edges_of(loaded, loaded.sources[0], [1e-3] * len(loaded.bodies))
+        of_box = [b.name for b in loaded.bodies].index("box")
+        mine = body == of_box
+        assert mine.sum() == 6 * split
+        lengths.append(np.linalg.norm(edges.end[mine] - edges.start[mine], axis=1).sum())
+    np.testing.assert_allclose(lengths, lengths[0], rtol=1e-5)
+
+
+def test_bodies_joined_or_not_cast_the_same_edges():
+    edges = []
+    for joined in (False, True):
+        loaded = grimaldi.load(scenes.bodies(6, seed=1, joined=joined))
+        found, _ = edges_of(loaded, loaded.sources[0], [1e-3] * len(loaded.bodies))
+        edges.append(found.start[np.lexsort(found.start.T)])
+    np.testing.assert_allclose(edges[0], edges[1])
+    assert len(edges[0]) / 6 == pytest.approx(33, rel=0.2)
+
+
+def test_another_library_takes_its_turns_at_the_same_points(tmp_path):
+    """Whose phase is compared but for a constant: here the plain script itself, turned by a quarter."""
+    script = "from grimaldi.bench.planar import plain\ndef run():\n    return 1j * plain(a, z, wavelength, x, 1e-9)\n"
+    side, points = planar.square(8)
+    exact = planar.plain(planar.RADIUS, planar.DISTANCE, planar.WAVELENGTH, side, 1e-9).ravel()
+    other = planar.Other(sys.executable, script, 8, tmp_path)
+    try:
+        seconds, errors = planar._in_turn({"other": other}, 2, np.arange(64), exact)
+    finally:
+        other.close()
+    assert points.shape == (64, 3)
+    assert seconds["other"] > 0
+    assert errors["other"] < 1e-12
+    assert planar._error(1j * exact, exact, turned=False) > 1
+
+
+def test_the_plain_script_is_fresnels_integral_on_the_axis():
+    a, z, wavelength = planar.RADIUS, planar.DISTANCE, planar.WAVELENGTH
+    side, _ = planar.square(16)
+    u = planar.plain(a, z, wavelength, side, 1e-9)
+    assert side[8] == 0
+    assert abs(u[8, 8]) == pytest.approx(abs(circle.fresnel(a, z, wavelength)), abs=1e-8)
+
+
+@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="elsewhere the system counts what the parent held")
+def test_a_childs_peak_is_its_own():
+    held = np.ones(50_000_000)  # 0.4 GB
+    code = "from grimaldi.bench.memory import peak; print(peak())"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert 0.01 < float(done.stdout) < 0.3 < held.nbytes / 1e9
