@@ -297,36 +297,37 @@ def body_sum(
     i = U(0)
     while receivers.active & (i < tab.tree.size):
         item, leaf, inside = visit(fr, tab, i)
-        piece = tab.piece(dr.select(leaf, item, 0))
-        acts = leaf & sounds(fr, piece, n)
-        visible = dr.mask_t(F)(acts)
-        past_real, past_imag = F(0), F(0)
-        if dr.hint(probe is not None, mode="scalar"):
-            assert probe is not None
-            left = _cut_off(fr, piece, k)
-            tested = acts & (left > share)
-            unasked += dr.select(acts & ~tested, left, 0)
-            if tested:
-                x = mi.Point3f(piece.middle + constant(tab.types.Vector, tab.centre))
-                visible = acts & probe.reaches(x, piece, p, tested)
-            if dr.hint(beside is not None, mode="scalar"):
-                assert beside is not None
-                body, close = other_than(beside, piece)
-                close &= tested & (left > FAINT)
-                if close:
-                    past_real, past_imag = grazed(fr, beside.silhouettes, piece, body, visible, k, close)
-            acts = visible | (past_real != 0) | (past_imag != 0)
-        passed = Passed(visible, past_real, past_imag) if beside is not None else None
-        chain = chain_wave(fr, tab, piece.first, piece.end, k, rule, passed, smooth, acts)
-        weight = _taper(fr, tab, piece)
-        real, imag = dr.fma(weight, chain.wave.real, real), dr.fma(weight, chain.wave.imag, imag)
-        err_real, err_imag = err_real + chain.wave.err_real, err_imag + chain.wave.err_imag
-        rounding2 += chain.wave.rounding2
-        receiver2 = dr.minimum(receiver2, chain.receiver2)
-        closer = visible & (chain.distance2 < nearest2)
-        nearest2 = dr.select(closer, chain.distance2, nearest2)
-        nearest_segment = dr.select(closer, chain.segment, nearest_segment)
-        nearest_piece = dr.select(closer, item, nearest_piece)
+        if receivers.active & leaf:
+            piece = tab.piece(item)
+            acts = leaf & sounds(fr, piece, n)
+            visible = dr.mask_t(F)(acts)
+            past_real, past_imag = F(0), F(0)
+            if dr.hint(probe is not None, mode="scalar"):
+                assert probe is not None
+                left = _cut_off(fr, piece, k)
+                tested = acts & (left > share)
+                unasked += dr.select(acts & ~tested, left, 0)
+                if tested:
+                    x = mi.Point3f(piece.middle + constant(tab.types.Vector, tab.centre))
+                    visible = acts & probe.reaches(x, piece, p, tested)
+                if dr.hint(beside is not None, mode="scalar"):
+                    assert beside is not None
+                    body, close = other_than(beside, piece)
+                    close &= tested & (left > FAINT)
+                    if close:
+                        past_real, past_imag = grazed(fr, beside.silhouettes, piece, body, visible, k, close)
+                acts = visible | (past_real != 0) | (past_imag != 0)
+            passed = Passed(visible, past_real, past_imag) if beside is not None else None
+            chain = chain_wave(fr, tab, piece.first, piece.end, k, rule, passed, smooth, acts)
+            weight = _taper(fr, tab, piece)
+            real, imag = dr.fma(weight, chain.wave.real, real), dr.fma(weight, chain.wave.imag, imag)
+            err_real, err_imag = err_real + chain.wave.err_real, err_imag + chain.wave.err_imag
+            rounding2 += chain.wave.rounding2
+            receiver2 = dr.minimum(receiver2, chain.receiver2)
+            closer = visible & (chain.distance2 < nearest2)
+            nearest2 = dr.select(closer, chain.distance2, nearest2)
+            nearest_segment = dr.select(closer, chain.segment, nearest_segment)
+            nearest_piece = dr.select(closer, item, nearest_piece)
         i = tab.tree.after(i, inside)
     nearest = Nearest(nearest2, nearest_segment, nearest_piece)
     return Sum(real, imag, err_real, err_imag, rounding2, unasked), nearest, Margins(nearest2, receiver2)
@@ -345,22 +346,23 @@ def _crossings(fr: Frame, tab: Table, bend: Any, n: Any, active: Any) -> Any:
     count, i = F(0), U(0)
     while active & (i < tab.tree.size):
         item, leaf, inside = visit(fr, tab, i)
-        piece = tab.piece(dr.select(leaf, item, 0))
-        acts = leaf & sounds(fr, piece, n)
-        j = U(piece.first)
-        while acts & (j < piece.end):
-            seg = tab.segment(j)
-            ln = line(fr, seg.X0, seg.e)
-            c0, c1 = _ahead(fr, seg, across)
-            turn = _turn(c0, c1, ln.kappa)
-            out = dr.abs(ln.kappa) * seg.length / dr.abs(c1 - c0)
-            z = ln.h + ln.ea * dr.clip(ln.td, 0, seg.length)
-            # the bent way is a triangle over the ray, `height` high where it bends
-            top = (fr.z2 - z) / (fr.z2 - along)
-            if not fr.plane:
-                top = dr.minimum(top, (fr.z1 + z) / (fr.z1 + along))
-            count += dr.select(out < height * dr.minimum(top, 1), turn, 0)
-            j += 1
+        if active & leaf:
+            piece = tab.piece(item)
+            acts = leaf & sounds(fr, piece, n)
+            j = U(piece.first)
+            while acts & (j < piece.end):
+                seg = tab.segment(j)
+                ln = line(fr, seg.X0, seg.e)
+                c0, c1 = _ahead(fr, seg, across)
+                turn = _turn(c0, c1, ln.kappa)
+                out = dr.abs(ln.kappa) * seg.length / dr.abs(c1 - c0)
+                z = ln.h + ln.ea * dr.clip(ln.td, 0, seg.length)
+                # the bent way is a triangle over the ray, `height` high where it bends
+                top = (fr.z2 - z) / (fr.z2 - along)
+                if not fr.plane:
+                    top = dr.minimum(top, (fr.z1 + z) / (fr.z1 + along))
+                count += dr.select(out < height * dr.minimum(top, 1), turn, 0)
+                j += 1
         i = tab.tree.after(i, inside)
     return count
 
