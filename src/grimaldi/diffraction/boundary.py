@@ -30,7 +30,7 @@ from grimaldi.scene.model import Scene, Source
 
 mi: Any = mitsuba  # the stubs refuse numbers where arrays are asked for
 
-UNASKED = 0.3  # of the tolerance: what all pieces whose X→P goes untested may add to M
+UNASKED = 0.3  # of the tolerance: what all pieces whose X→P goes untested may add to M, each the same
 
 
 class Problem(NamedTuple):
@@ -161,6 +161,7 @@ def _bodies(problem: Problem, precision: Types) -> Evaluate:
     rule = problem.rule()
     probe = rays(scene, source, outline.sag)
     tab = table(outline, source, precision)
+    n_pieces = dr.width(tab.ranges) - 1
     grazing = None if grazed is None else chords(grazed, tab.centre, precision)
 
     def evaluate(receivers: Receivers) -> Factor:
@@ -170,7 +171,7 @@ def _bodies(problem: Problem, precision: Types) -> Evaluate:
             tab,
             tab.device(k),
             rule,
-            UNASKED * options.tolerance,
+            UNASKED * options.tolerance / n_pieces,
             probe if options.occlusion != "none" else None,
             None if grazing is None else near(fr, grazing, tab.device(k), receivers),
             options.rim == "smooth",

@@ -21,6 +21,7 @@ class Corner(NamedTuple):
     """A point of an outline as a ray S→P sees it."""
 
     q: Any  # across the ray
+    h: Any  # along it
     d2: Any  # |q|²
     along: Any  # ∇Δ along the ray
     inv: Any  # 1/r + 1/s: ∇Δ across is q times it
@@ -32,12 +33,12 @@ class Corner(NamedTuple):
 
 
 class Ends(NamedTuple):
-    """The wave between two corners, whether it serves, and κ."""
+    """The wave between two corners, whether it serves, and a·(q × q'), which has the sign of κ."""
 
     real: Any
     imag: Any
     serves: Any
-    kappa: Any
+    turn: Any
 
 
 def corner(frame: Frame, X: Any, k: Any) -> Corner:
@@ -64,7 +65,7 @@ def corner(frame: Frame, X: Any, k: Any) -> Corner:
         inv = inv_r + inv_s
         C = 0.5 + 0.5 * (z1 * z2 - d2) * inv_r * inv_s
     sin, cos = sincos(k * delta)
-    return Corner(q, d2, along, inv, C, cos, sin, dr.select(between, d2, dr.inf), to_p2)
+    return Corner(q, h, d2, along, inv, C, cos, sin, dr.select(between, d2, dr.inf), to_p2)
 
 
 def _excess(z: Any, d2: Any, inv: Any) -> Any:
@@ -73,16 +74,15 @@ def _excess(z: Any, d2: Any, inv: Any) -> Any:
     return dr.select(z > 0, d2 / reach, reach)
 
 
-def between(frame: Frame, a: Corner, b: Corner, e: Any, length: Any, k: Any, rule: Corners) -> Ends:
-    """∫ C e^{ikΔ} dφ along e from corner a to b."""
-    kappa = dr.dot(frame.a, dr.cross(a.q, e))
-    ea = dr.dot(e, frame.a)
+def between(ray: Any, a: Corner, b: Corner, k: Any, rule: Corners) -> Ends:
+    """∫ C e^{ikΔ} dφ from corner a to b, about a ray of that direction."""
+    d, h = b.q - a.q, b.h - a.h
+    length2 = dr.fma(h, h, dr.squared_norm(d))
+    turn = dr.dot(ray, dr.cross(a.q, d))
     # ψ' at the corners, times the length
-    scale = k * length
-    slope_a = scale * dr.fma(ea, a.along, dr.dot(a.q, e) * a.inv)
-    slope_b = scale * dr.fma(ea, b.along, dr.dot(b.q, e) * b.inv)
+    slope_a = k * dr.fma(h, a.along, dr.dot(a.q, d) * a.inv)
+    slope_b = k * dr.fma(h, b.along, dr.dot(b.q, d) * b.inv)
     bend = slope_b - slope_a
-    turn = kappa * length
 
     # short: Δφ = atan(turn / a·b), shared out so that dφ/dt is in the ratio of 1/d²
     x = turn / dr.dot(a.q, b.q)
@@ -97,19 +97,19 @@ def between(frame: Frame, a: Corner, b: Corner, e: Any, length: Any, k: Any, rul
     near_a, near_b = share * b.d2 * a.C, share * a.d2 * b.C
     short_real = near_a * (re * a.cos - im_a * a.sin) + near_b * (re * b.cos - im_b * b.sin)
     short_imag = near_a * (re * a.sin + im_a * a.cos) + near_b * (re * b.sin + im_b * b.cos)
-    is_short = (dr.abs(bend) < rule.bend) & (dr.square(length) < rule.near2 * dr.minimum(a.d2, b.d2))
+    is_short = (dr.abs(bend) < rule.bend) & (length2 < rule.near2 * dr.minimum(a.d2, b.d2))
 
     # far: i C φ'/ψ' e^{iψ} at a, less the same at b
     end_a = turn * a.C / (a.d2 * slope_a)
     end_b = turn * b.C / (b.d2 * slope_b)
     is_far = (slope_a * slope_b > 0) & (
-        dr.minimum(dr.square(slope_a) / a.inv, dr.square(slope_b) / b.inv) > 2 * rule.far * k * dr.square(length)
+        dr.minimum(dr.square(slope_a) / a.inv, dr.square(slope_b) / b.inv) > 2 * rule.far * k * length2
     )
     return Ends(
         dr.select(is_short, short_real, end_b * b.sin - end_a * a.sin),
         dr.select(is_short, short_imag, end_a * a.cos - end_b * b.cos),
         is_short | is_far,
-        kappa,
+        turn,
     )
 
 

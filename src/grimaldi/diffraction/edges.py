@@ -25,9 +25,6 @@ from grimaldi.diffraction.table import Piece, Segment, Table
 NEVER = Corners(0.0, 0.0, float("inf"))  # for traces where corners are not asked
 
 
-STEPS = 10  # halvings between the largest and the smallest wave's end that may go unasked
-
-
 class Sum(NamedTuple):
     """Σ ∫ C e^{ikΔ} dφ, its error estimate, the square of its ends' rounding, and |M| taken for visible unasked."""
 
@@ -117,30 +114,30 @@ def chain_wave(
     distance2, segment, receiver2, n = F(dr.inf), U(first), F(dr.inf), F(0)
     _, across = _basis(fr.a)
     j = U(first)
-    last = tuple(corner(fr, tab.corner(j), k))  # a plain tuple: what Dr.Jit can carry from turn to turn
+    last = tuple(corner(fr, tab.corner(j, 0), k))  # a plain tuple: what Dr.Jit can carry from turn to turn
     while active & (j < end):
-        seg = tab.segment(j)
-        a, b = Corner(*last), corner(fr, seg.X1, k)
-        ends = between(fr, a, b, seg.e, seg.length, k, rule.corners or NEVER)
+        a, b = Corner(*last), corner(fr, tab.corner(j, 1), k)
+        ends = between(fr.a, a, b, k, rule.corners or NEVER)
         wave = ends.real, ends.imag, F(0), F(0), F(0)
         d2 = dr.minimum(a.on_ray2, b.on_ray2)
         p2 = dr.minimum(a.to_p2, b.to_p2)
-        kappa = F(ends.kappa)
+        turn = F(ends.turn)
         whole = active & ~ends.serves
         if dr.hint(not by_corners, mode="scalar"):
             whole = dr.mask_t(F)(active)
         if whole:
+            seg = tab.segment(j)
             ln = line(fr, seg.X0, seg.e)
             full = segment_wave(fr, ln, seg.length, k, rule, whole)
             if dr.hint(smooth, mode="scalar"):
                 full = damped(full, fr, ln, seg.length, seg.radius, k)
             wave = tuple(full)
-            d2, p2, kappa = closest(fr, seg, ln), to_receiver(fr, seg, ln), ln.kappa
-        n += _turn(dr.dot(a.q, across), dr.dot(b.q, across), kappa)
+            d2, p2, turn = closest(fr, seg, ln), to_receiver(fr, seg, ln), ln.kappa
+        n += _turn(dr.dot(a.q, across), dr.dot(b.q, across), turn)
         if dr.hint(passed is not None, mode="scalar"):
             assert passed is not None
             wave = Wave(*wave).times(
-                dr.select(passed.visible, 1, 0) + dr.mulsign(passed.real, kappa), dr.mulsign(passed.imag, kappa)
+                dr.select(passed.visible, 1, 0) + dr.mulsign(passed.real, turn), dr.mulsign(passed.imag, turn)
             )
         real, imag, err_real = real + wave[0], imag + wave[1], err_real + wave[2]
         err_imag, rounding2 = err_imag + wave[3], rounding2 + wave[4]
@@ -230,32 +227,6 @@ def _taper(fr: Frame, tab: Table, piece: Piece) -> Any:
     return t * t * (3 - 2 * t)
 
 
-def _binned(sums: list[Any], left: Any, budget: float) -> list[Any]:
-    return [x + dr.select(left <= budget * 2.0**-j, left, 0) for j, x in enumerate(sums)]
-
-
-@dr.syntax
-def faint(fr: Frame, tab: Table, n: Any, k: Any, budget: float, active: Any) -> Any:
-    """The largest |M| of a wave's end that goes unasked, so that all of them add up to `budget` at most.
-
-    It is sought among budget/2^i; at the last of them, budget/pieces, all may go unasked.
-    """
-    F = tab.types.Float
-    share = dr.maximum(F(budget) / F(tab.n_pieces), budget * 2.0**-STEPS)
-    sums = [F(0) for _ in range(STEPS)]
-    i = dr.uint32_array_t(F)(0)
-    while active & (i < tab.tree.size):
-        item, leaf, inside = visit(fr, tab, i)
-        if active & leaf:
-            piece = tab.piece(item)
-            left = dr.select(sounds(fr, piece, n), _cut_off(fr, piece, k), 0)
-            sums = _binned(sums, left, budget)
-        i = tab.tree.after(i, inside)
-    for j in range(STEPS - 1, -1, -1):
-        share = dr.select(sums[j] <= budget, dr.maximum(share, budget * 2.0**-j), share)
-    return share
-
-
 def closest(fr: Frame, seg: Segment, ln: Line) -> Any:
     """Squared distance of the ray S→P to a segment, infinite outside of S..P."""
     t = dr.clip(ln.td, 0, seg.length)
@@ -272,7 +243,7 @@ def body_sum(
     tab: Table,
     k: Any,
     rule: Rule,
-    budget: float,
+    share: float,
     probe: Rays | None,
     beside: Near | None,
     smooth: bool,
@@ -280,7 +251,7 @@ def body_sum(
 ) -> tuple[Sum, Nearest, Margins]:
     """The sum over the outlines of bodies, piece by piece, each as far as it reaches the receiver.
 
-    Waves of `budget` in all go unasked; without a probe all do. Without silhouettes
+    What would add less than `share` of M goes unasked; without a probe all does. Without silhouettes
     near by a piece reaches the receiver or does not. `smooth` rims are those with a radius.
     """
     F = tab.types.Float
@@ -290,7 +261,6 @@ def body_sum(
     if dr.hint(probe is not None, mode="scalar"):
         assert probe is not None
         p = p + probe.epsilon(p) * receivers.n  # off its own surface
-        share = faint(fr, tab, n, k, budget, receivers.active)
     real, imag, err_real, err_imag = F(0), F(0), F(0), F(0)
     nearest2, nearest_segment, nearest_piece = F(dr.inf), U(0), U(0)
     receiver2, rounding2, unasked = F(dr.inf), F(0), F(0)

@@ -65,9 +65,9 @@ class Table(NamedTuple):
         a, b, c = (dr.gather(P, self.segments, 3 * i + j) for j in range(3))
         return Segment(V(a.x, a.y, a.z), V(b.x, b.y, b.z), V(c.x, c.y, c.z), a.w, c.w)
 
-    def corner(self, i: Any) -> Any:
-        """Where a segment begins."""
-        a = dr.gather(self.types.Packet, self.segments, 3 * i)
+    def corner(self, i: Any, end: int) -> Any:
+        """Where a segment begins (0) or ends (1)."""
+        a = dr.gather(self.types.Packet, self.segments, 3 * i + end)
         return self.types.Vector(a.x, a.y, a.z)
 
     def first(self, i: Any) -> Any:
