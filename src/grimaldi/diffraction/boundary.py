@@ -23,7 +23,7 @@ from grimaldi.diffraction.model import Evaluate, Factor, Options, Receivers
 from grimaldi.diffraction.occlusion import rays
 from grimaldi.diffraction.screen import beyond
 from grimaldi.diffraction.segment import Rule
-from grimaldi.diffraction.table import Table, needs_double, table
+from grimaldi.diffraction.table import Table, coarseness, needs_double, table
 from grimaldi.outlines.model import Outline
 from grimaldi.outlines.silhouettes import silhouettes
 from grimaldi.scene.model import Scene, Source
@@ -160,8 +160,8 @@ def _bodies(problem: Problem, precision: Types) -> Evaluate:
     scene, source, outline, k, options, grazed = problem
     rule = problem.rule()
     probe = rays(scene, source, outline.sag)
-    tab = table(outline, source, precision)
-    n_pieces = dr.width(tab.ranges) - 1
+    tab = table(outline, source, precision, coarse=coarseness(options.tolerance))
+    n_pieces = int(tab.n_pieces[0])
     grazing = None if grazed is None else chords(grazed, tab.centre, precision)
 
     def evaluate(receivers: Receivers) -> Factor:

@@ -16,12 +16,13 @@ from grimaldi.diffraction.corners import Corner, between, corner
 from grimaldi.diffraction.creeping import damped
 from grimaldi.diffraction.frame import Frame, constant
 from grimaldi.diffraction.grazing import FAINT, Near, grazed, other_than
-from grimaldi.diffraction.hierarchy import least_detour
+from grimaldi.diffraction.hierarchy import NONE, least_detour
 from grimaldi.diffraction.model import Receivers
 from grimaldi.diffraction.occlusion import Rays
 from grimaldi.diffraction.segment import Corners, Line, Rule, Wave, growth, line, path, segment_wave
 from grimaldi.diffraction.table import Piece, Segment, Table
 
+ANGLE = 0.08  # rad, half of what a run of pieces subtends at most to be heard or not as one
 NEVER = Corners(0.0, 0.0, float("inf"))  # for traces where corners are not asked
 
 
@@ -161,7 +162,7 @@ def planar_sum(fr: Frame, tab: Table, k: Any, rule: Rule, active: Any) -> tuple[
     ray2, receiver2, rounding2 = F(dr.inf), F(dr.inf), F(0)
     n, i = F(0), U(0)
     while active & (i < tab.n_pieces):
-        chain = chain_wave(fr, tab, tab.first(i), tab.first(i + 1), k, rule, None, False, active)
+        chain = chain_wave(fr, tab, *tab.range(i), k, rule, None, False, active)
         n += chain.n
         real, imag = real + chain.wave.real, imag + chain.wave.imag
         err_real, err_imag = err_real + chain.wave.err_real, err_imag + chain.wave.err_imag
@@ -215,10 +216,17 @@ def _cut_off(fr: Frame, piece: Piece, k: Any) -> Any:
 
 
 def visit(fr: Frame, tab: Table, i: Any) -> tuple[Any, Any, Any]:
-    """The piece at a node of the table's tree, whether there is one that counts, and whether to go into the node."""
-    inside = least_detour(fr, *tab.tree.node(i)) <= tab.far
-    item, leaf = tab.tree.leaf(i)
-    return item, inside & leaf, inside
+    """The piece or run that a node of the table's tree stands for, whether to take it, and whether to go into the node.
+
+    A run is taken as one where it subtends a small angle about the ray.
+    """
+    centre, radius = tab.tree.node(i)
+    inside = least_detour(fr, centre, radius) <= tab.far
+    item = tab.tree.item_of(i)
+    x = centre - fr.foot
+    d2 = dr.squared_norm(x) - dr.square(dr.dot(x, fr.a))
+    whole = (item < tab.n_pieces) | ((item != NONE) & (dr.square(radius) < ANGLE * ANGLE * d2))
+    return item, inside & whole, inside & ~whole
 
 
 def _taper(fr: Frame, tab: Table, piece: Piece) -> Any:
@@ -266,10 +274,10 @@ def body_sum(
     receiver2, rounding2, unasked = F(dr.inf), F(0), F(0)
     i = U(0)
     while receivers.active & (i < tab.tree.size):
-        item, leaf, inside = visit(fr, tab, i)
-        if receivers.active & leaf:
+        item, taken, inside = visit(fr, tab, i)
+        if receivers.active & taken:
             piece = tab.piece(item)
-            acts = leaf & sounds(fr, piece, n)
+            acts = sounds(fr, piece, n)
             visible = dr.mask_t(F)(acts)
             past_real, past_imag = F(0), F(0)
             if dr.hint(probe is not None, mode="scalar"):
@@ -315,10 +323,10 @@ def _crossings(fr: Frame, tab: Table, bend: Any, n: Any, active: Any) -> Any:
     across = dr.cross(fr.a, q / height)
     count, i = F(0), U(0)
     while active & (i < tab.tree.size):
-        item, leaf, inside = visit(fr, tab, i)
-        if active & leaf:
+        item, taken, inside = visit(fr, tab, i)
+        if active & taken:
             piece = tab.piece(item)
-            acts = leaf & sounds(fr, piece, n)
+            acts = sounds(fr, piece, n)
             j = U(piece.first)
             while acts & (j < piece.end):
                 seg = tab.segment(j)

@@ -22,7 +22,7 @@ import numpy as np
 
 from grimaldi.diffraction.arrays import Types
 from grimaldi.diffraction.frame import Frame
-from grimaldi.diffraction.hierarchy import Tree, least_detour, tree
+from grimaldi.diffraction.hierarchy import NONE, Tree, flat, layout, least_detour
 from grimaldi.diffraction.knife_edge import amplitude
 from grimaldi.diffraction.model import Receivers
 from grimaldi.diffraction.segment import line, sincos
@@ -94,8 +94,9 @@ def chords(outline: Outline, centre: Vector, types: Types) -> Chords | None:
     begin = np.searchsorted(of[order], np.arange(of.max() + 2))
     index = dr.uint32_array_t(types.Float)
     middle, half = (0.5 * (start + end))[order], 0.5 * length[order, 0]
-    around = tree(middle, half, types, leaves_only=len(of) < FEW)
-    return Chords(types.buffer(records), index(begin.astype(np.uint32)), around, types)
+    plan = flat(middle, half) if len(of) < FEW else layout(middle, half, of[order])
+    item = np.where(plan.end == plan.begin + 1, plan.order[plan.begin], NONE)
+    return Chords(types.buffer(records), index(begin.astype(np.uint32)), plan.tree(item, types), types)
 
 
 def passing(way: Frame, chord: Chord, k: float) -> Passing:
@@ -126,8 +127,8 @@ def near(fr: Frame, silhouettes: Chords, k: float, receivers: Receivers) -> Near
     i = dr.uint32_array_t(F)(0)
     while receivers.active & (i < silhouettes.tree.size):
         inside = least_detour(fr, *silhouettes.tree.node(i)) <= far
-        item, leaf = silhouettes.tree.leaf(i)
-        if receivers.active & inside & leaf:
+        item = silhouettes.tree.item_of(i)
+        if receivers.active & inside & (item != NONE):
             chord = silhouettes.chord(item)
             at = passing(fr, chord, k)
             x = chord.start + at.t * chord.e - p

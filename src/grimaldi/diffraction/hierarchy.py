@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 from grimaldi.diffraction.arrays import Types, on_device
 from grimaldi.diffraction.frame import Frame
 
-CHILDREN = 4
+CHILDREN = 2
 BITS = 10  # of each coordinate, by which neighbours are found
 
 
 class Tree(NamedTuple):
-    """Nodes as flat device buffers; `item` of a leaf is what it stands for."""
+    """Nodes as flat device buffers; `item` is what they stand for."""
 
     spheres: Any
     skip: Any
@@ -37,37 +37,63 @@ class Tree(NamedTuple):
         """The next node, where a node is gone into or passed by."""
         return dr.select(inside, i + 1, dr.gather(type(self.skip), self.skip, i))
 
-    def leaf(self, i: Any) -> tuple[Any, Any]:
-        """Which item a node stands for, and whether it stands for one."""
-        item = dr.gather(type(self.item), self.item, i)
-        return item, item != NONE
+    def item_of(self, i: Any) -> Any:
+        """What a node stands for."""
+        return dr.gather(type(self.item), self.item, i)
 
 
 NONE = 0xFFFFFFFF
 
 
-def tree(centre: NDArray[np.float64], radius: NDArray[np.float64], types: Types, leaves_only: bool) -> Tree:
-    """The hierarchy of items (n, 3) with radii (n,); `leaves_only`: the items alone, in their order."""
+class Layout(NamedTuple):
+    """A hierarchy over items in `order`: each node's sphere, where to go past it, and which of them it holds."""
+
+    order: NDArray[np.int64]
+    spheres: NDArray[np.float64]  # centre and radius (m, 4)
+    skip: NDArray[np.int64]
+    begin: NDArray[np.int64]
+    end: NDArray[np.int64]
+
+    def tree(self, item: NDArray[np.int64], types: Types) -> Tree:
+        """On the device; item (m,): what each node stands for, `NONE` if only for what is inside."""
+        index = dr.uint32_array_t(types.Float)
+        size = on_device(index, len(self.skip))
+        return Tree(
+            types.buffer(self.spheres), index(self.skip.astype(np.uint32)), index(item.astype(np.uint32)), size, types
+        )
+
+
+def flat(centre: NDArray[np.float64], radius: NDArray[np.float64]) -> Layout:
+    """Items (n, 3) with radii (n,) in their own order, and nothing above them."""
+    leaf = np.arange(len(centre))
+    return Layout(leaf, np.column_stack([centre, radius]), leaf + 1, leaf, leaf + 1)
+
+
+def layout(centre: NDArray[np.float64], radius: NDArray[np.float64], group: NDArray[np.int64]) -> Layout:
+    """The hierarchy of items (n, 3) with radii (n,): near groups together, items of a group in their order."""
     n = len(centre)
-    order = np.arange(n) if leaves_only else np.argsort(_morton(centre), kind="stable")
+    _, of = np.unique(group, return_inverse=True)
+    place = _morton(np.stack([np.bincount(of, x) for x in centre.T], axis=1) / np.bincount(of)[:, None])
+    order = np.lexsort((np.arange(n), of, place[of]))
     centre, radius = centre[order], radius[order]
-    blocks = [] if leaves_only else _blocks(n)
+    blocks = _blocks(n)
     total = n + sum(-(-n // b) for b in blocks)
     spheres = np.zeros((total, 4))
-    skip, item = np.zeros(total, np.uint32), np.full(total, NONE, np.uint32)
+    skip, begin, end = (np.zeros(total, np.int64) for _ in range(3))
     leaf = np.arange(n)
     at = leaf + sum((leaf // b + 1 for b in blocks), np.zeros(n, np.int64))
-    spheres[at], skip[at], item[at] = np.column_stack([centre, radius]), at + 1, order
+    spheres[at] = np.column_stack([centre, radius])
+    skip[at], begin[at], end[at] = at + 1, leaf, leaf + 1
     for b in blocks:
         start = np.arange(0, n, b)
-        end = np.minimum(start + b, n)
+        stop = np.minimum(start + b, n)
         at = start + sum((start // c + (c > b) for c in blocks), np.zeros(len(start), np.int64))
         low = np.minimum.reduceat(centre - radius[:, None], start)
         high = np.maximum.reduceat(centre + radius[:, None], start)
         spheres[at] = np.column_stack([0.5 * (low + high), 0.5 * np.linalg.norm(high - low, axis=1)])
-        skip[at] = end + sum((-(-end // c) for c in blocks), np.zeros(len(end), np.int64))
-    index = dr.uint32_array_t(types.Float)
-    return Tree(types.buffer(spheres), index(skip), index(item), on_device(index, total), types)
+        skip[at] = stop + sum((-(-stop // c) for c in blocks), np.zeros(len(stop), np.int64))
+        begin[at], end[at] = start, stop
+    return Layout(order, spheres, skip, begin, end)
 
 
 def _blocks(n: int) -> list[int]:

@@ -8,10 +8,11 @@ import numpy as np
 from grimaldi.diffraction.arrays import types
 from grimaldi.diffraction.boundary import Problem, unoccluded
 from grimaldi.diffraction.model import Options
+from grimaldi.diffraction.table import MANY
 from grimaldi.outlines.model import Outline, Reals
 from grimaldi.scene.model import Scene, Source
 
-FEW = 256  # segments, which are all summed
+FEW = 2 * MANY  # segments, which are all summed
 POINTS = 64  # where it is measured
 LEFT_OUT = 0.2  # of the tolerance, at most at these points
 LADDER = 2.0 ** np.arange(5, 15)  # of kΔ

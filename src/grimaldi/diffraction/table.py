@@ -9,12 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from grimaldi.diffraction.arrays import Types, on_device
-from grimaldi.diffraction.hierarchy import Tree, tree
+from grimaldi.diffraction.hierarchy import NONE, Layout, Tree, flat, layout
 from grimaldi.diffraction.model import Options
-from grimaldi.outlines.model import Outline
+from grimaldi.outlines.model import Outline, Reals
 from grimaldi.scene.model import Source, Vector
 
-LONGEST_PIECE = 8  # segments
+LONGEST_PIECE = 8  # segments, at a tolerance of 1e-3
+MANY = 2048  # pieces, that a hierarchy pays for: receivers beside each other go different ways through it
 
 
 class Segment(NamedTuple):
@@ -50,9 +51,9 @@ class Table(NamedTuple):
     size: Any  # segments
     n_pieces: Any
     segments: Any
-    ranges: Any
+    ranges: Any  # first segment and the one after the last, of pieces and then of longer runs
     pieces: Any
-    tree: Tree  # of the pieces
+    tree: Tree  # of pieces and runs
     far: Any  # what lies at a larger Δ adds nothing
     types: Types
 
@@ -70,17 +71,16 @@ class Table(NamedTuple):
         a = dr.gather(self.types.Packet, self.segments, 3 * i + end)
         return self.types.Vector(a.x, a.y, a.z)
 
-    def first(self, i: Any) -> Any:
-        """First segment of a piece."""
-        return dr.gather(type(self.ranges), self.ranges, i)
+    def range(self, i: Any) -> tuple[Any, Any]:
+        """First segment of a piece, and the one after its last."""
+        index = type(self.ranges)
+        return dr.gather(index, self.ranges, 2 * i), dr.gather(index, self.ranges, 2 * i + 1)
 
     def piece(self, i: Any) -> Piece:
         P, V = self.types.Packet, self.types.Vector
         a, b, c, d, e = (dr.gather(P, self.pieces, 5 * i + j) for j in range(5))
-        index = type(self.ranges)
         return Piece(
-            dr.gather(index, self.ranges, i),
-            dr.gather(index, self.ranges, i + 1),
+            *self.range(i),
             V(a.x, a.y, a.z),
             a.w,
             V(b.x, b.y, b.z),
@@ -93,19 +93,27 @@ class Table(NamedTuple):
         )
 
 
-def cut(outline: Outline) -> NDArray[np.int64]:
-    """First segments of the pieces, and the number of segments: runs of a chain, at most a 64th of a body's extent."""
-    extent = {b: np.linalg.norm(np.ptp(outline.start[outline.body == b], axis=0)) for b in np.unique(outline.body)}
+def coarseness(tolerance: float) -> float:
+    """How much longer pieces may be than at a tolerance of 1e-3 or less: the sides of a step in M grow with it."""
+    return float(np.clip(np.cbrt(tolerance / 1e-3), 1, 4))
+
+
+def cut(outline: Outline, coarse: float = 1.0) -> NDArray[np.int64]:
+    """First segments of the pieces, and the number of segments: runs of a chain, a 64th of a body's extent or less.
+
+    coarse: by what factor pieces may be longer.
+    """
+    bodies, of = np.unique(outline.body, return_inverse=True)
+    low, high = (np.full((len(bodies), 3), sign * np.inf) for sign in (1, -1))
+    np.minimum.at(low, of, outline.start)
+    np.maximum.at(high, of, outline.start)
+    most = (coarse / 64 * np.linalg.norm(high - low, axis=1))[of]
     lengths = np.linalg.norm(outline.end - outline.start, axis=1)
+    inner = np.isfinite(outline.behind)
+    new = np.append(True, (outline.chain[1:] != outline.chain[:-1]) | (inner[1:] != inner[:-1]))
     first, in_piece, total = [], 0, 0.0
-    for i, (length, chain) in enumerate(zip(lengths, outline.chain, strict=True)):
-        if (
-            i == 0
-            or chain != outline.chain[i - 1]
-            or np.isfinite(outline.behind[i]) != np.isfinite(outline.behind[i - 1])
-            or in_piece == LONGEST_PIECE
-            or total + length > extent[outline.body[i]] / 64
-        ):
+    for i, (begins, length, longest) in enumerate(zip(new.tolist(), lengths.tolist(), most.tolist(), strict=True)):
+        if begins or in_piece >= coarse * LONGEST_PIECE or total + length > longest:
             first.append(i)
             in_piece, total = 0, 0.0
         in_piece += 1
@@ -129,6 +137,7 @@ def table(
     source: Source,
     types: Types,
     ranges: NDArray[np.int64] | None = None,
+    coarse: float = 1.0,
 ) -> Table:
     """Pack what a source sees; its pieces begin at the segments `ranges`, the last of which is their number (`cut`)."""
     ends = np.concatenate([outline.start, outline.end])
@@ -136,22 +145,26 @@ def table(
     # on a coarse grid, so that differences to it are exact and points stay as near each other as they were
     grid = 2.0 ** np.floor(np.log2(max(float(np.ptp(ends, axis=0).max()), 1e-300)) - 2)
     centre = grid * np.round(0.5 * (low + high) / grid)
-    ranges = cut(outline) if ranges is None else ranges
     X0, X1 = outline.start - centre, outline.end - centre
     length = np.linalg.norm(X1 - X0, axis=1, keepdims=True)
     zero = np.zeros_like(length)
     segments = np.concatenate([X0, length, X1, zero, (X1 - X0) / length, outline.radius[:, None]], 1)
-    middle = (ranges[:-1] + ranges[1:]) // 2
+    if ranges is None:
+        ranges = cut(outline, coarse)
+    plan, runs, item = (_plan if np.isfinite(outline.far) else _pieces_alone)(outline, X0, X1, ranges)
+    first, end = runs.T
+    middle = (first + end) // 2
     target = 0.5 * (X0[middle] + X1[middle])
-    reach = 0.5 * np.add.reduceat(length[:, 0], ranges[:-1])[:, None]
+    walked = np.append(0, np.cumsum(length))
+    reach = 0.5 * (walked[end] - walked[first])[:, None]
     normals = outline.normals[middle]
     closed = (np.linalg.norm(normals[:, 1], axis=1) > 0).astype(float)[:, None]
     of = outline.body[middle].astype(float)[:, None]
-    behind = np.minimum.reduceat(np.minimum(outline.behind, 1e30), ranges[:-1])[:, None]
+    behind = np.array([np.minimum(outline.behind, 1e30)[a:b].min() for a, b in runs])[:, None]
     pieces = np.concatenate(
         [
             *(target, reach, normals[:, 0], closed, normals[:, 1], of, outline.outward[middle], behind),
-            *((X1 - X0)[ranges[:-1]] / length[ranges[:-1]], zero[: len(middle)]),
+            *((X1 - X0)[first] / length[first], zero[: len(middle)]),
         ],
         1,
     )
@@ -161,11 +174,44 @@ def table(
         float(np.linalg.norm(np.concatenate([X0, X1]), axis=1).max()),
         np.inf if source.position is None else float(outline.distances(source.position).min()),
         on_device(index, len(outline)),
-        on_device(index, len(middle)),
+        on_device(index, np.count_nonzero(plan.end == plan.begin + 1)),
         types.buffer(segments),
-        index(ranges.astype(np.uint32)),
+        index(runs.ravel().astype(np.uint32)),
         types.buffer(pieces),
-        tree(target, reach[:, 0], types, leaves_only=not np.isfinite(outline.far)),
+        plan.tree(item, types),
         on_device(types.Float, min(outline.far, 1e30)),
         types,
     )
+
+
+def _spheres(X0: Reals, X1: Reals, ranges: NDArray[np.int64]) -> tuple[Reals, Reals]:
+    """Centre and radius round the segments of each piece."""
+    low = np.minimum.reduceat(np.minimum(X0, X1), ranges[:-1])
+    high = np.maximum.reduceat(np.maximum(X0, X1), ranges[:-1])
+    return 0.5 * (low + high), 0.5 * np.linalg.norm(high - low, axis=1)
+
+
+def _pieces_alone(
+    _: Outline, X0: Reals, X1: Reals, ranges: NDArray[np.int64]
+) -> tuple[Layout, NDArray[np.int64], NDArray[np.int64]]:
+    """Pieces one after the other: their layout, the segments of each, and what the nodes stand for."""
+    plan = flat(*_spheres(X0, X1, ranges))
+    return plan, np.stack([ranges[:-1], ranges[1:]], axis=1), plan.begin
+
+
+def _plan(
+    outline: Outline, X0: Reals, X1: Reals, ranges: NDArray[np.int64]
+) -> tuple[Layout, NDArray[np.int64], NDArray[np.int64]]:
+    """The same as a hierarchy, whose nodes stand for runs of pieces where these follow each other in a chain."""
+    first = ranges[:-1]
+    plan = layout(*_spheres(X0, X1, ranges), outline.body[first])
+    a, b = plan.order[plan.begin], plan.order[plan.end - 1]
+    inner = np.isfinite(outline.behind)
+    same = (outline.chain[first[a]] == outline.chain[first[b]]) & (b - a == plan.end - plan.begin - 1)
+    changes = np.append(0, np.cumsum(inner[1:] != inner[:-1]))
+    same &= changes[first[a]] == changes[first[b]]
+    long = np.flatnonzero(same & (b > a))
+    item = np.where(b == a, a, NONE)
+    item[long] = len(first) + np.arange(len(long))
+    runs = np.stack([np.append(first, first[a[long]]), np.append(ranges[1:], ranges[b[long] + 1])], axis=1)
+    return plan, runs, item
