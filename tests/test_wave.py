@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import grimaldi
-from grimaldi.engine.tiles import Shot, render_tile
+from grimaldi.engine.tiles import Shot, bands, render_tile
 from grimaldi.errors import InputError
 from grimaldi.light import Settings, prepare
 
@@ -156,7 +156,9 @@ def test_a_tile_equals_the_same_pixels_of_the_whole_bit_for_bit():
     scene = grimaldi.load(dictionary)
     sensor = scene.mitsuba.sensors()[0]
     light = prepare(scene, Settings(wavelength=0.02))
-    tile = render_tile(light, sensor, Shot(48, 40, 8, 7, 2, 5, False), 48 * 13 + 5, 96)
+    shot = Shot(48, 40, 8, 7, 2, 5, False)
+    (band,) = bands(light, sensor, shot)
+    tile = render_tile(light, sensor, shot, 48 * 13 + 5, 96, band)
     pixels = slice(48 * 13 + 5, 48 * 13 + 5 + 96)
     np.testing.assert_array_equal(tile.picture.T, whole.picture.values.reshape(-1, 3)[pixels])
     np.testing.assert_array_equal(tile.U[0].astype(np.complex64), whole.U.values.reshape(-1)[pixels])

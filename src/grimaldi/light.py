@@ -104,7 +104,8 @@ class Light:
         amplitudes = [(mi.UnpolarizedSpectrum(0), mi.UnpolarizedSpectrum(0)) for _ in self.keys]
         for beam, found in zip_longest(self.beams, known):
             receivers = Receivers(p, n, active)
-            u = beam.times(receivers, beam.factor(receivers) if found is None else _unless(*found, beam, receivers))
+            m = beam.factor(receivers) if found is None else _unless(found[0], found[1], beam, receivers)
+            u = beam.times(receivers, m)
             wo = si.to_local(toward(beam.source, si.p))
             f = mi.unpolarized_spectrum(bsdf.eval(context, si, wo, active))
             weight = dr.sqrt(dr.maximum(f, 0) * _tint(beam.source))

@@ -174,7 +174,7 @@ def table(
         float(np.linalg.norm(np.concatenate([X0, X1]), axis=1).max()),
         np.inf if source.position is None else float(outline.distances(source.position).min()),
         on_device(index, len(outline)),
-        on_device(index, np.count_nonzero(plan.end == plan.begin + 1)),
+        on_device(index, int(np.count_nonzero(plan.end == plan.begin + 1))),
         types.buffer(segments),
         index(runs.ravel().astype(np.uint32)),
         types.buffer(pieces),

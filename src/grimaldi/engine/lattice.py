@@ -137,7 +137,7 @@ def lattice(evaluate: Evaluate, width: int, top: int, rows: int, finest: int, sh
         _fill(nodes, grid, x, y, size, evaluate)
         serves, error = _judged(nodes, grid, x, y, size, finest, share)
         levels.append(_level(size, x, y, across * LARGEST // size, down * LARGEST // size, serves, error))
-        left = dr.compress(~serves)
+        left: Any = dr.compress(~serves)
         if size == finest or len(left) == 0:
             break
         size //= 2
@@ -253,5 +253,6 @@ def _by_pixel(nodes: _Nodes, grid: _Grid, levels: list[_Level], pixels: int, row
         error = dr.select(serves, dr.gather(mi.Float, level.error, place), error)
     first = grid.node(x & ~(size - 1), y & ~(size - 1), size, 0, 0)
     shape = dr.gather(mi.UInt32, nodes.shape, first, size > 0)
-    dr.eval(size, error, shape)
-    return Lattice(grid, nodes.values, size, shape, error, dr.count(size == 0)[0])
+    unknown: Any = dr.count(size == 0)
+    dr.eval(size, error, shape, unknown)
+    return Lattice(grid, nodes.values, size, shape, error, int(unknown[0]))

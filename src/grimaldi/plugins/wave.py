@@ -140,7 +140,7 @@ def register(V: Any) -> None:
                 scene,
                 sampler,
                 ray,
-                light.reflected,
+                lambda ray, si, bsdf, n, active, _: light.reflected(ray, si, bsdf, n, active),
                 len(light.keys),
                 self.max_depth,
                 self.rr_depth,
