@@ -8,6 +8,8 @@ import pytest
 import grimaldi
 from grimaldi import PlanarOutline
 from grimaldi.diffraction import fresnel_plane as fast
+from grimaldi.diffraction import quadrature
+from grimaldi.diffraction.lattice import lattice
 from grimaldi.diffraction.model import Options
 from grimaldi.errors import GrimaldiWarning, InputError
 from grimaldi.reference import circle
@@ -170,8 +172,8 @@ def test_quadrature_keeps_its_share(hole, tolerance):
 
     def transform(by):
         total, area = 0j, 0.0
-        for part in fast.patches(scene):
-            x, w = fast.nodes(part, part.rule(by * slope, tolerance))
+        for part in quadrature.patches(scene):
+            x, w = quadrature.nodes(part, part.rule(by * slope, tolerance))
             total, area = total + w @ np.exp(1j * slope * (x @ direction)), area + abs(part.area).sum()
         return total / area
 
@@ -179,12 +181,12 @@ def test_quadrature_keeps_its_share(hole, tolerance):
 
 
 def test_a_lattice_is_known_by_its_rows():
-    found = fast.lattice(grid(3.0, 1.0, (4, 7)) @ np.linalg.qr(np.random.default_rng(0).normal(size=(3, 3)))[0])
+    found = lattice(grid(3.0, 1.0, (4, 7)) @ np.linalg.qr(np.random.default_rng(0).normal(size=(3, 3)))[0])
     assert found is not None
     assert (found.rows, found.columns) == (4, 7)
     moved = grid(3.0, 1.0, (4, 7))
     moved[11, 0] += 1e-6
-    assert fast.lattice(moved) is None
+    assert lattice(moved) is None
 
 
 def test_options_carry_it():
