@@ -67,7 +67,7 @@ def acts(monkeypatch):
         return result
 
     monkeypatch.setattr("grimaldi.propagate.fresnel_plane", spied)
-    monkeypatch.setattr(fast, "_seconds", lambda *_: 0.0)
+    monkeypatch.setattr(fast, "seconds", lambda *_: 0.0)
     return answers
 
 

@@ -22,16 +22,26 @@ class Types(NamedTuple):
     def buffer(self, values: NDArray[Any]) -> Any:
         """Numbers as one flat device buffer."""
         dtype = np.float64 if dr.itemsize_v(self.Float) == 8 else np.float32
-        return self.Float(_aligned(np.asarray(values, dtype).ravel()))
+        return self.Float(_aligned(values, dtype))
 
 
-def _aligned(values: NDArray[Any]) -> NDArray[Any]:
-    """A copy at a multiple of 128: Dr.Jit reads NumPy's memory in place, and compiles its alignment into kernels."""
-    room = np.empty(values.nbytes + 128, np.uint8)
+def _aligned(values: NDArray[Any], dtype: Any) -> NDArray[Any]:
+    """A flat copy at a multiple of 128: Dr.Jit reads NumPy's memory in place, and compiles in how it is aligned."""
+    size = values.size * np.dtype(dtype).itemsize
+    room = np.empty(size + 128, np.uint8)
     first = -room.ctypes.data % 128
-    copy = room[first : first + values.nbytes].view(values.dtype)
-    copy[:] = values
+    copy = room[first : first + size].view(dtype)
+    copy.reshape(values.shape)[...] = values
     return copy
+
+
+def complex_array(real: Any, imag: Any) -> NDArray[np.complex128]:
+    """Two Dr.Jit arrays as one NumPy array."""
+    dr.eval(real, imag)  # in one kernel
+    dr.eval(real, imag)  # in one kernel
+    z = np.empty(len(real), np.complex128)
+    z.real, z.imag = real.numpy(), imag.numpy()
+    return z
 
 
 def on_device(kind: Any, number: float) -> Any:

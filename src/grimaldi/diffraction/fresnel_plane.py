@@ -20,29 +20,24 @@ import drjit as dr
 import numpy as np
 from numpy.typing import NDArray
 
-from grimaldi.diffraction.arrays import types
+from grimaldi.diffraction.arrays import complex_array, types
 from grimaldi.diffraction.frame import constant
 from grimaldi.diffraction.lattice import Lattice
 from grimaldi.diffraction.model import Evaluate, Factor, Options, Receivers
 from grimaldi.diffraction.planes import Plane, Remainder, Screen, remainder
 from grimaldi.diffraction.quadrature import Patches, Rule, nodes, patches
 from grimaldi.diffraction.segment import sincos
-from grimaldi.diffraction.transform import sums, upsampling
+from grimaldi.diffraction.transform import FINEST, seconds, sums
 from grimaldi.outlines.candidate import segments_for
 from grimaldi.outlines.model import Reals
 from grimaldi.scene.model import Scene, Source
 
 QUADRATURE, TRANSFORM = 0.0625, 0.25  # shares of the tolerance
 EXCESS = 20  # finufft's largest error over its eps: up to 17 seen at the rim of its modes, for upsampling by 1.25
-FINEST = 1e-14  # of finufft's eps
 LEAST = 1e-3  # of the bound: less error than that is not expected
 SAMPLES, SAFETY = 16, 2.5  # points where the error is measured, and what it may be elsewhere times that
 MOST_NODES = 1 << 23
-MOST_CELLS = 1 << 26  # of the FFT
-
-# Rough seconds on two cores; only which is larger matters, and mostly by far.
-PAIR, PAIR_DOUBLE = 4e-9, 1.2e-8  # a point and a segment of the line integral
-SPREAD, CELL, CALL = 1e-9, 5e-9, 5e-3  # a node or target and a cell that it covers; a cell of the FFT; the rest
+PAIR, PAIR_DOUBLE = 4e-9, 1.2e-8  # rough seconds of a point and a segment of the line integral
 
 
 def kernel(screen: Screen, x: Any, p: Any) -> tuple[Any, Any]:
@@ -111,7 +106,7 @@ def fresnel_plane(
     # the nodes serve finufft's strongest aliases too, which lie within 2b
     rules = [part.rule(k * plane.slope(2 * plane.b), 0.5 * QUADRATURE * options.tolerance / mass) for part in parts]
     size = sum(rule.size * len(part.area) for rule, part in zip(rules, parts, strict=True))
-    if size > MOST_NODES or _seconds(plane, eps, size, len(points)) > _line_seconds(scene, plane, options, len(points)):
+    if size > MOST_NODES or seconds(plane, eps, size, len(points)) > _line_seconds(scene, plane, options, len(points)):
         return None
     if left(plane.b) + numerical > options.tolerance:
         # what is left out is small and smooth: a hundredth of it needs few nodes
@@ -139,8 +134,9 @@ class Opening:
         double = types(double=True)
         V = double.Vector
         p0 = constant(V, plane.p0 - plane.screen.x0)
-        at_p0 = _complex(kernel(plane.screen, V(*map(double.buffer, x.T)), p0))
-        ratio = at_p0 / _complex(kernel(plane.screen, constant(V, np.zeros(3)), p0))
+        with_middle = np.concatenate([x, np.zeros((1, 3))])
+        at_p0 = complex_array(*kernel(plane.screen, V(*map(double.buffer, with_middle.T)), p0))
+        ratio = at_p0[:-1] / at_p0[-1]
         return Opening(plane, x, weights, weights * ratio)
 
     def excess(self, points: Reals, bound: Remainder) -> float:
@@ -156,22 +152,22 @@ class Opening:
         V, F, m = double.Vector, double.Float, len(self.x)
         i = dr.arange(dr.uint32_array_t(F), len(chosen) * m)
         node, point = i % m, i // m
-        x = V(*(dr.gather(F, double.buffer(column), node) for column in self.x.T))
-        at = points[chosen] - screen.x0
-        p = V(*(dr.gather(F, double.buffer(column), point) for column in at.T))
-        re, im = kernel(screen, x, p)
-        w, c_re, c_im = (
-            dr.gather(F, double.buffer(values), node)
-            for values in (self.weights, self.factored.real, self.factored.imag)
-        )
-        exact = _complex((dr.block_sum(w * re, m), dr.block_sum(w * im, m)))
-        y = points[chosen] - self.plane.p0
+
+        def each(index: Any, *columns: Reals) -> list[Any]:
+            return [dr.gather(F, double.buffer(column), index) for column in columns]
+
+        at, y = points[chosen] - screen.x0, points[chosen] - self.plane.p0
         B = -screen.k * screen.axes.T @ self.plane.B @ screen.axes
-        q = V(*(dr.gather(F, double.buffer(column), point) for column in (y @ B.T).T))
-        sin, cos = sincos(dr.dot(x, q))
-        factored = _complex((dr.block_sum(c_re * cos - c_im * sin, m), dr.block_sum(c_re * sin + c_im * cos, m)))
-        outer = _complex(kernel(screen, constant(V, np.zeros(3)), V(*map(double.buffer, at.T))))
-        off = np.abs(factored * outer - exact)
+        outer = complex_array(*kernel(screen, constant(V, np.zeros(3)), V(*map(double.buffer, at.T))))
+        x = V(*each(node, *self.x.T))
+        w, re, im = each(node, self.weights, self.factored.real, self.factored.imag)
+        u, v = each(point, outer.real, outer.imag)
+        sin, cos = sincos(dr.dot(x, V(*each(point, *(y @ B.T).T))))
+        exact_re, exact_im = kernel(screen, x, V(*each(point, *at.T)))
+        real, imag = re * cos - im * sin, re * sin + im * cos
+        off = w * exact_re - (u * real - v * imag), w * exact_im - (u * imag + v * real)
+        dr.eval(off)
+        off = np.abs(complex_array(*(dr.block_sum(part, m) for part in off)))
         return float((off / bound(np.linalg.norm(y, axis=1))).max())
 
 
@@ -194,27 +190,12 @@ def _evaluate(opening: Opening, hole: bool, points: Reals, eps: float, left: Rem
     return evaluate
 
 
-def _complex(z: tuple[Any, Any]) -> NDArray[np.complex128]:
-    return z[0].numpy() + 1j * z[1].numpy()
-
-
 def _turning(loop: Reals) -> float:
     """By how much the direction along a loop (n, 3) turns, 2π if it is convex [rad]."""
     e = np.roll(loop, -1, axis=0) - loop
     following = np.roll(e, -1, axis=0)
     sin, cos = np.linalg.norm(np.cross(e, following), axis=1), np.einsum("ij,ij->i", e, following)
     return float(np.arctan2(sin, cos).sum())
-
-
-def _seconds(plane: Plane, eps: float, size: int, n: int) -> float:
-    """What the transform is expected to take."""
-    width = max(-math.log10(eps), 1) + 2
-    if plane.lattice is not None:
-        cells = upsampling(eps) ** 2 * n
-        return CALL + CELL * cells + SPREAD * size * width**2
-    phase = plane.screen.k * plane.curvature * plane.screen.a * plane.b
-    cells = (8 / np.pi * phase + 4 * width) ** 2
-    return CALL + CELL * cells + SPREAD * (size + n) * width**2 if cells < MOST_CELLS else math.inf
 
 
 def _line_seconds(scene: Scene, plane: Plane, options: Options, n: int) -> float:

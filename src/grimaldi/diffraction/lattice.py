@@ -9,6 +9,8 @@ import numpy as np
 from grimaldi.outlines.model import Reals
 from grimaldi.scene.model import Vector
 
+CACHED = 1 << 15  # numbers: a quarter of a MB
+
 
 class Lattice(NamedTuple):
     """Points that stand in `rows` of `columns`."""
@@ -31,24 +33,35 @@ class Lattice(NamedTuple):
 
 def rounding(points: Reals) -> Vector:
     """How far (3,) rounding may move points (n, 3) of these coordinates."""
-    return 2e-15 * np.maximum(points.max(axis=0), -points.min(axis=0))
+    return 2e-15 * np.array([max(axis.max(), -axis.min()) for axis in points.T])
 
 
 def lattice(points: Reals) -> Lattice | None:
     """The lattice whose rows are the points (n, 3), but for rounding; None where there is none."""
     if len(points) < 4:
         return None
-    slack = rounding(points)
     ahead = points[: 1 << 15]
-    on = np.abs(ahead - ahead[0] - np.arange(len(ahead))[:, None] * (ahead[1] - ahead[0])) <= len(ahead) * slack
-    columns = len(on) if on.all() else int(on.all(axis=1).argmin())
+    on = np.abs(ahead - ahead[0] - np.arange(len(ahead))[:, None] * (ahead[1] - ahead[0]))
+    on = (on <= len(ahead) * np.maximum(rounding(ahead), rounding(points[-1:]))).all(axis=1)
+    columns = len(on) if on.all() else int(on.argmin())
     if columns < 2 or len(points) % columns or len(points) < 2 * columns:
         return None
     rows = points.reshape(-1, columns, 3)
     u, v = (rows[0, -1] - rows[0, 0]) / (columns - 1), (rows[-1, 0] - rows[0, 0]) / (len(rows) - 1)
-    for axis in range(3):
-        off = rows[:, :, axis] - (rows[0, 0, axis] + np.arange(columns) * u[axis])
-        off -= (np.arange(len(rows)) * v[axis])[:, None]
-        if max(off.max(), -off.min()) > slack[axis]:
-            return None
-    return Lattice(len(rows), columns, u, v)
+    found = Lattice(len(rows), columns, u, v)
+    return found if _stands(found, points) else None
+
+
+def _stands(grid: Lattice, points: Reals) -> bool:
+    """Whether all points are where the lattice has them, a few rows at a time, as they fit the cache."""
+    rows = points.reshape(grid.rows, 3 * grid.columns)
+    slack = np.tile(rounding(points[grid.corners]), grid.columns)
+    first = (points[0] + np.arange(grid.columns)[:, None] * grid.u).ravel()
+    step = np.tile(grid.v, grid.columns)
+    block = max(1, CACHED // len(first))
+    for start in range(0, grid.rows, block):
+        off = rows[start : start + block] - first
+        off -= np.multiply.outer(np.arange(start, start + len(off)), step)
+        if not (np.abs(off, out=off) <= slack).all():
+            return False
+    return True

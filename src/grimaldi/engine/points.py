@@ -31,7 +31,7 @@ def at_points(
     """One source's wave at points (n, 3), `block` of them after the other."""
     import drjit as dr
 
-    from grimaldi.diffraction.arrays import types
+    from grimaldi.diffraction.arrays import complex_array, types
     from grimaldi.diffraction.model import Receivers
     from grimaldi.diffraction.occlusion import surface_normals
 
@@ -43,4 +43,4 @@ def at_points(
         n = normals(p)
         u = wave(Receivers(p, n, dr.mask_t(p.x)(True)))
         dr.eval(u)
-        yield Part(which, u.real.numpy() + 1j * u.imag.numpy(), u.error.numpy(), u.free.numpy())
+        yield Part(which, complex_array(u.real, u.imag), u.error.numpy(), u.free.numpy())
