@@ -4,11 +4,12 @@ import warnings
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 import grimaldi
 from grimaldi import PlanarOutline
 from grimaldi.diffraction import fresnel_plane as fast
-from grimaldi.diffraction import quadrature
+from grimaldi.diffraction import quadrature, transform
 from grimaldi.diffraction.lattice import lattice
 from grimaldi.diffraction.model import Options
 from grimaldi.errors import GrimaldiWarning, InputError
@@ -178,6 +179,36 @@ def test_quadrature_keeps_its_share(hole, tolerance):
         return total / area
 
     assert abs(transform(1) - transform(4)) <= tolerance
+
+
+@pytest.mark.parametrize("width", [4, 7, 11, 16])
+@pytest.mark.parametrize("n", [100, 101])
+def test_waves_of_any_length_in_the_band_are_interpolated(width, n):
+    band = 0.2
+    coarse = transform.Coarse.of(n, band, width)
+    assert coarse.spacing > 5
+    xi = np.linspace(-band, band, 41)
+    far, near = ((np.arange(count) - count // 2)[:, None] for count in (coarse.size, n))
+    got = coarse(np.exp(1j * xi * coarse.spacing * far) / coarse.spectrum(xi))
+    np.testing.assert_allclose(got, np.exp(1j * xi * near), rtol=0, atol=coarse.error)
+    assert coarse.error < 30 * abs(got - np.exp(1j * xi * near)).max() + 1e-13
+
+
+@pytest.mark.parametrize("eps", [1e-3, 1e-6, 1e-9, 1e-12])
+@pytest.mark.parametrize("bands", [(0.1, 0.2), (0.0, 0.3), (1.5, 2.0)])
+def test_sums_on_a_lattice_are_the_sums(bands, eps):
+    """Against the sums themselves; with all waves at the corners of the band, where they are hardest."""
+    rows, columns = 150, 131
+    random = np.random.default_rng(2)
+    for at in (random.uniform(-1, 1, (2, 300)), random.choice([-1, 1], (2, 300))):
+        a_row, a_point = np.array(bands)[:, None] * at
+        c: NDArray[np.complex128] = np.exp(2j * np.pi * random.uniform(size=300)) / 300
+        got = transform.on_lattice(rows, columns, a_row, a_point, c, eps)
+        row, column = np.arange(rows) - rows // 2, np.arange(columns) - columns // 2
+        exact = np.exp(1j * row[:, None] * a_row) @ (c[:, None] * np.exp(1j * np.outer(a_point, column)))
+        np.testing.assert_allclose(got, exact, rtol=0, atol=fast.EXCESS * eps)
+    coarse = transform.coarser(rows, columns, bands[0], bands[1], eps)
+    assert (coarse is None) == (bands == (1.5, 2.0))
 
 
 def test_a_lattice_is_known_by_its_rows():

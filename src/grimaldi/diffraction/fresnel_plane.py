@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import drjit as dr
 import numpy as np
@@ -97,16 +97,12 @@ def fresnel_plane(
     mass = k / (2 * np.pi) * plane.curvature * area
     covers = sum(_turning(loop) for shape in scene.screen for loop in shape.world_loops(16)) / (2 * np.pi)
     left = remainder(plane, area, covers)
-    # finufft's error is what it would return at its aliases, times eps: |M| <= 1 + ∮|dφ|/2π
-    eps = TRANSFORM * options.tolerance / (EXCESS * min(mass, 1 + covers))
     phase = k * plane.slope(plane.b) * (screen.a + plane.b)
     numerical = (QUADRATURE + TRANSFORM) * options.tolerance + 1e-15 * (1 + phase)
-    if LEAST * left(plane.b) + numerical > options.tolerance or eps < FINEST:
+    if LEAST * left(plane.b) + numerical > options.tolerance:
         return None
-    # the nodes serve finufft's strongest aliases too, which lie within 2b
-    rules = [part.rule(k * plane.slope(2 * plane.b), 0.5 * QUADRATURE * options.tolerance / mass) for part in parts]
-    size = sum(rule.size * len(part.area) for rule, part in zip(rules, parts, strict=True))
-    if size > MOST_NODES or seconds(plane, eps, size, len(points)) > _line_seconds(scene, plane, options, len(points)):
+    way = _cheapest(plane, parts, mass, covers, options.tolerance, len(points))
+    if way is None or way.seconds > _line_seconds(scene, plane, options, len(points)):
         return None
     if left(plane.b) + numerical > options.tolerance:
         # what is left out is small and smooth: a hundredth of it needs few nodes
@@ -114,8 +110,32 @@ def fresnel_plane(
         left = left.scaled(min(1.0, SAFETY * coarse.excess(points, left)))
         if left(plane.b) + numerical > options.tolerance:
             return None
-    opening = Opening.of(plane, parts, rules)
-    return _evaluate(opening, scene.screen[0].hole, points, min(eps, 1e-2), left, numerical)
+    opening = Opening.of(plane, parts, way.rules)
+    return _evaluate(opening, scene.screen[0].hole, points, way.eps, left, numerical)
+
+
+class Way(NamedTuple):
+    """What the holes are summed by, finufft's eps, and the seconds that this may take."""
+
+    rules: list[Rule]
+    eps: float
+    seconds: float
+
+
+def _cheapest(plane: Plane, parts: list[Patches], mass: float, covers: float, tolerance: float, n: int) -> Way | None:
+    """The way to n points to the shares of the tolerance that takes least; None where there is none.
+
+    finufft's error is what it would return at its aliases, times eps: at most mass = ∫|K| dA, or |M| <= 1 + ∮|dφ|/2π
+    if the nodes serve the strongest aliases too, which lie within 2b.
+    """
+    ways = []
+    for largest, reach in ((mass, plane.b), (min(mass, 1 + covers), 2 * plane.b)):
+        eps = min(TRANSFORM * tolerance / (EXCESS * largest), 1e-2)
+        rules = [part.rule(plane.screen.k * plane.slope(reach), 0.5 * QUADRATURE * tolerance / mass) for part in parts]
+        count = sum(len(rule.rho) * len(part.area) for rule, part in zip(rules, parts, strict=True))
+        if eps >= FINEST and count <= MOST_NODES:
+            ways.append(Way(rules, eps, seconds(plane, eps, count, n)))
+    return min(ways, key=lambda way: way.seconds, default=None)
 
 
 @dataclass(frozen=True, eq=False)

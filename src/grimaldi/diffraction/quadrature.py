@@ -6,8 +6,9 @@ from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from grimaldi.outlines.model import Reals
+from grimaldi.outlines.model import Integers, Reals
 from grimaldi.scene.model import Scene
 
 
@@ -27,23 +28,24 @@ class Patches(NamedTuple):
         """For integrands whose phase grows by `slope` a length at most, to `share` of their modulus."""
         if self.ellipse:
             reach = float(np.linalg.norm(np.stack([self.first[0], self.second[0]]), 2))
-            n = 2 * count(slope * reach, share)  # the trapezoid rule is exact to half the degree of Gauss's
-            round_ = np.arange(n, dtype=np.float64) * (2 * np.pi / n), np.full(n, 1 / n)
-            return Rule(gauss(0.5 * slope * reach, share), round_)
+            rho, weight = gauss(0.5 * slope * reach, share)
+            # the trapezoid rule is exact to half the degree of Gauss's, and small rings need fewer nodes
+            each = 2 * count(slope * reach * rho, share)
+            first = np.repeat(np.cumsum(each) - each, each)
+            t = (np.arange(len(first)) - first) * np.repeat(2 * np.pi / each, each)
+            return Rule(np.repeat(rho, each), t, np.repeat(weight / each, each))
         ends = np.stack([self.first, self.first + self.second])
         reach, side = (float(np.linalg.norm(v, axis=-1).max()) for v in (ends, self.second))
-        return Rule(gauss(0.5 * slope * reach, share), gauss(0.5 * slope * side, share))
+        (rho, w_rho), (t, w_t) = (gauss(0.5 * slope * length, share) for length in (reach, side))
+        return Rule(np.repeat(rho, len(t)), np.tile(t, len(rho)), np.outer(w_rho, w_t).ravel())
 
 
 class Rule(NamedTuple):
-    """Nodes and weights over ρ in 0..1 and over t."""
+    """Nodes (n,) at ρ in 0..1 and t, and their weights dρ dt."""
 
-    radial: tuple[Reals, Reals]
-    round: tuple[Reals, Reals]
-
-    @property
-    def size(self) -> int:
-        return len(self.radial[0]) * len(self.round[0])
+    rho: Reals
+    t: Reals
+    weight: Reals
 
 
 def patches(scene: Scene) -> list[Patches]:
@@ -65,7 +67,7 @@ def patches(scene: Scene) -> list[Patches]:
     return parts
 
 
-def count(half: float, share: float) -> int:
+def count(half: ArrayLike, share: float) -> Integers:
     """How many Gauss-Legendre nodes integrate e^{iφ}, |φ'| <= half over [-1, 1], to `share` of 2.
 
     The error is at most 64/15 e^{|Im φ|} ρ^{-2n}/(1 - ρ^{-2}) with φ on Bernstein's ellipse of any ρ = e^σ (Trefethen,
@@ -73,24 +75,23 @@ def count(half: float, share: float) -> int:
     leaves room for a factor of polynomial size.
     """
     sigma = np.geomspace(0.01, 5, 200)
-    n = (half * np.sinh(sigma) * np.cosh(sigma) + np.log(8.6 / share / -np.expm1(-2 * sigma))) / (2 * sigma)
-    return int(np.ceil(n.min())) + 1
+    growth = np.sinh(sigma) * np.cosh(sigma) / (2 * sigma)
+    n = np.multiply.outer(half, growth) + np.log(8.6 / share / -np.expm1(-2 * sigma)) / (2 * sigma)
+    return np.ceil(n.min(axis=-1)).astype(int) + 1
 
 
 @lru_cache(maxsize=64)
 def gauss(half: float, share: float) -> tuple[Any, Any]:
     """Nodes and weights on 0..1, in panels of at most 60 radians either side."""
     panels = int(np.ceil(max(half, 1.0) / 60))
-    x, w = np.polynomial.legendre.leggauss(count(half / panels, share))
+    x, w = np.polynomial.legendre.leggauss(int(count(half / panels, share)))
     middles = np.arange(panels)[:, None] + 0.5
     return ((middles + 0.5 * x) / panels).ravel(), np.tile(0.5 * w / panels, panels)
 
 
 def nodes(part: Patches, rule: Rule) -> tuple[Reals, Reals]:
     """Points (n, 3) and weights (n,), which add up to the area."""
-    (rho, w_rho), (t, w_t) = rule
-    along, across = (np.cos(t), np.sin(t)) if part.ellipse else (np.ones_like(t), t)
-    rim = along[:, None] * part.first[:, None] + across[:, None] * part.second[:, None]
-    x = part.centre[:, None, None] + rho[:, None, None] * rim[:, None]
-    w = 2 * part.area[:, None, None] * (rho * w_rho)[:, None] * w_t
-    return x.reshape(-1, 3), w.ravel()
+    rho, t, weight = rule
+    along, across = (rho * np.cos(t), rho * np.sin(t)) if part.ellipse else (rho, rho * t)
+    x = part.centre[:, None] + along[:, None] * part.first[:, None] + across[:, None] * part.second[:, None]
+    return x.reshape(-1, 3), np.multiply.outer(2 * part.area, rho * weight).ravel()
