@@ -130,7 +130,7 @@ def coarser(rows: int, columns: int, row_band: float, point_band: float, eps: fl
     """Interpolations down the rows and along them, of phases up to the bands a step; None where they do not pay."""
     for width in range(4, 24):
         coarse = Coarse.of(rows, row_band, width), Coarse.of(columns, point_band, width)
-        if coarse[0].error <= 0.1 * eps:
+        if coarse[0].error <= eps:
             pays = WORTH * coarse[0].size * coarse[1].size <= rows * columns
             return coarse if pays and _finer(eps, coarse) >= FINEST else None
     return None
