@@ -2,8 +2,9 @@
 
 The plain script is Barnett's method (JATIS 7(2) 021211) in its fewest lines: Fresnel's approximation, one wavelength,
 one hole, no bound of the error. LightPipes and diffractio run where --lightpipes and --diffractio name a Python that
-has them. All are asked at the same points and held against the line integral at some of these; the two libraries'
-phase is compared but for a constant. Runs take turns, so that what else the machine does slows all of them.
+has them, on the points' own grid, or one --finer and --wider; their phase is compared but for a constant. All are asked
+at the same points and held against the line integral at some of these. Runs take turns, so that what else the machine
+does slows all of them.
 """
 
 from __future__ import annotations
@@ -44,7 +45,9 @@ def run():
 SETUP = """
 import sys, time
 import numpy as np
-n, a, z, wavelength, step = {n}, {a}, {z}, {wavelength}, {step}
+a, z, wavelength, finer = {a}, {z}, {wavelength}, {finer}
+n, step = {n} * finer * {wider}, {step} / finer
+asked = n // 2 + finer * (np.arange({n}) - {n} // 2)
 x = step * (np.arange(n) - n // 2)
 """
 SERVE = """
@@ -56,7 +59,7 @@ while True:
     start = time.perf_counter()
     u = run()
     seconds = time.perf_counter() - start
-    np.save(line.strip(), u)
+    np.save(line.strip(), u[np.ix_(asked, asked)])
     print("seconds", seconds, flush=True)
 """
 
@@ -132,6 +135,8 @@ def main() -> None:
     parser.add_argument("--tolerance", type=float, default=1e-6)
     parser.add_argument("--runs", type=int, default=5)
     parser.add_argument("--checks", type=int, default=50, help="points compared with the line integral")
+    parser.add_argument("--finer", type=int, default=1, help="times, the grid of the two libraries")
+    parser.add_argument("--wider", type=int, default=1, help="times, the square that they compute")
     parser.add_argument("--lightpipes", help="a Python that has LightPipes")
     parser.add_argument("--diffractio", help="a Python that has diffractio")
     args = parser.parse_args()
@@ -155,7 +160,7 @@ def main() -> None:
     line = ours(points[chosen], 1e-2 * args.tolerance, precision="double", fast=False)
     axis = np.array([[0, 0, z]])
     on_axis = abs(abs(ours(axis, fast=False)[0]) - abs(circle.fresnel(a, z, wavelength)))
-    values = {"n": n, "a": a, "z": z, "wavelength": wavelength, "step": step}
+    values = {"n": n, "a": a, "z": z, "wavelength": wavelength, "step": step, "finer": args.finer, "wider": args.wider}
     others = (("LightPipes, Fresnel", args.lightpipes, LIGHTPIPES), ("diffractio, RS", args.diffractio, DIFFRACTIO))
     with tempfile.TemporaryDirectory() as folder:
         ways: dict[str, Callable[[], tuple[float, Complex]]] = {
