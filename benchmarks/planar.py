@@ -2,9 +2,9 @@
 
 The plain script is Barnett's method (JATIS 7(2) 021211) in its fewest lines: Fresnel's approximation, one wavelength,
 one hole, no bound of the error. LightPipes and diffractio run where --lightpipes and --diffractio name a Python that
-has them, on the points' own grid, or one --finer and --wider; their phase is compared but for a constant. All are asked
-at the same points and held against the line integral at some of these. Runs take turns, so that what else the machine
-does slows all of them.
+has them, on the points' grid, --wider since light needs room beside the hole, and --finer if asked; their phase is
+compared but for a constant. All are held against the line integral at some of the points. Runs take turns, so that
+what else the machine does slows all of them.
 """
 
 from __future__ import annotations
@@ -128,21 +128,21 @@ def main() -> None:
         description=(__doc__ or "").split("\n", 1)[0], formatter_class=argparse.ArgumentDefaultsHelpFormatter
     )
     parser.add_argument("--size", type=int, default=1024, help="points along a side")
-    parser.add_argument("--radius", type=float, default=0.03)
-    parser.add_argument("--distance", type=float, default=360.0)
+    parser.add_argument("--radius", type=float, default=0.05)
+    parser.add_argument("--distance", type=float, default=550.0)
     parser.add_argument("--wavelength", type=float, default=5e-7)
-    parser.add_argument("--half-side", type=float, default=None, help="of the square; twice the radius unless given")
+    parser.add_argument("--half-side", type=float, default=None, help="of the square; the radius unless given")
     parser.add_argument("--tolerance", type=float, default=1e-6)
     parser.add_argument("--runs", type=int, default=5)
     parser.add_argument("--checks", type=int, default=50, help="points compared with the line integral")
     parser.add_argument("--finer", type=int, default=1, help="times, the grid of the two libraries")
-    parser.add_argument("--wider", type=int, default=1, help="times, the square that they compute")
+    parser.add_argument("--wider", type=int, default=2, help="times, the square that they compute")
     parser.add_argument("--lightpipes", help="a Python that has LightPipes")
     parser.add_argument("--diffractio", help="a Python that has diffractio")
     args = parser.parse_args()
 
     a, z, wavelength, n = args.radius, args.distance, args.wavelength, args.size
-    step = 2 * (args.half_side or 2 * a) / n
+    step = 2 * (args.half_side or a) / n
     side = step * (np.arange(n) - n // 2)
     x, y = np.meshgrid(side, side)
     points = np.stack([x, y, np.full_like(x, z)], axis=-1).reshape(-1, 3)

@@ -196,7 +196,7 @@ def _evaluate(opening: Opening, hole: bool, points: Reals, eps: float, left: Rem
     double = types(double=True)
     F, V, index = double.Float, double.Vector, dr.uint32_array_t(double.Float)
     p0, zero = constant(V, opening.plane.p0 - screen.x0), constant(V, np.zeros(3))
-    flat = double.buffer(sums(opening.plane, points, opening.x, opening.factored, eps).view(np.float64))
+    flat = double.taken(sums(opening.plane, points, opening.x, opening.factored, eps).view(np.float64))
 
     def evaluate(receivers: Receivers) -> Factor:
         p = V(receivers.p) - constant(V, screen.x0)

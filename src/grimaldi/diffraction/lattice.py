@@ -9,6 +9,7 @@ import numpy as np
 from grimaldi.outlines.model import Reals
 from grimaldi.scene.model import Vector
 
+SHORT = 1 << 11  # points of most rows
 CACHED = 1 << 15  # numbers: a quarter of a MB
 
 
@@ -40,10 +41,9 @@ def lattice(points: Reals) -> Lattice | None:
     """The lattice whose rows are the points (n, 3), but for rounding; None where there is none."""
     if len(points) < 4:
         return None
-    ahead = points[: 1 << 15]
-    on = np.abs(ahead - ahead[0] - np.arange(len(ahead))[:, None] * (ahead[1] - ahead[0]))
-    on = (on <= len(ahead) * np.maximum(rounding(ahead), rounding(points[-1:]))).all(axis=1)
-    columns = len(on) if on.all() else int(on.argmin())
+    columns = _on_a_line(points[:SHORT])
+    if columns == SHORT:
+        columns = _on_a_line(points[: 1 << 15])
     if columns < 2 or len(points) % columns or len(points) < 2 * columns:
         return None
     rows = points.reshape(-1, columns, 3)
@@ -54,14 +54,20 @@ def lattice(points: Reals) -> Lattice | None:
 
 def _stands(grid: Lattice, points: Reals) -> bool:
     """Whether all points are where the lattice has them, a few rows at a time, as they fit the cache."""
-    rows = points.reshape(grid.rows, 3 * grid.columns)
-    slack = np.tile(rounding(points[grid.corners]), grid.columns)
-    first = (points[0] + np.arange(grid.columns)[:, None] * grid.u).ravel()
-    step = np.tile(grid.v, grid.columns)
-    block = max(1, CACHED // len(first))
-    for start in range(0, grid.rows, block):
-        off = rows[start : start + block] - first
-        off -= np.multiply.outer(np.arange(start, start + len(off)), step)
-        if not (np.abs(off, out=off) <= slack).all():
-            return False
+    size = max(1, CACHED // grid.columns)
+    for axis, slack in enumerate(rounding(points[grid.corners])):
+        rows, u, v = points[:, axis].reshape(grid.rows, grid.columns), grid.u[axis], grid.v[axis]
+        some = rows[0, 0] + np.arange(grid.columns) * u + np.arange(min(size, grid.rows))[:, None] * v
+        for start in range(0, grid.rows, size):
+            off = rows[start : start + size] - some[: grid.rows - start]
+            off -= start * v
+            if not max(off.max(), -off.min()) <= slack:
+                return False
     return True
+
+
+def _on_a_line(points: Reals) -> int:
+    """How many of the points, from the first on, stand as far from one to the next as the second from the first."""
+    off = np.abs(points - points[0] - np.arange(len(points))[:, None] * (points[1] - points[0]))
+    on = (off <= len(points) * rounding(points)).all(axis=1)
+    return len(on) if on.all() else int(on.argmin())

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from grimaldi.diffraction.arrays import aligned_empty
 from grimaldi.diffraction.lattice import Lattice
 from grimaldi.diffraction.planes import Plane
 from grimaldi.outlines.model import Reals
@@ -21,6 +22,8 @@ Complexes = NDArray[np.complex128]
 FINEST = 1e-14  # of finufft's eps
 WORTH = 4  # so many times fewer cells are worth an interpolation
 MOST_CELLS = 1 << 26  # of the FFT
+ROWS = 32  # interpolated at a time: their matrix is a narrow band
+SERIAL = 1 << 17  # products of numbers so small that BLAS starts no threads for them
 
 # Rough seconds on two cores; only which is larger matters, and mostly by far.
 SPREAD, CELL, CALL = 1e-9, 5e-9, 5e-3  # a node or target and a cell that it covers; a cell of the FFT; the rest
@@ -66,18 +69,22 @@ class Coarse(NamedTuple):
 
     def __call__(self, values: Complexes) -> Complexes:
         """Values (count, m) at the coarse points as values (n, m) at the points."""
-        from scipy.sparse import csr_array
         from scipy.special import i0
 
+        columns = np.ascontiguousarray(values).view(np.float64)
+        result = aligned_empty(self.n * values.shape[1], np.complex128).reshape(self.n, -1)
+        out = result.view(np.float64)
         at = (np.arange(self.n) - self.n // 2) / self.spacing
-        first = np.ceil(at - 0.5 * self.width).astype(int)
-        j = first[:, None] + np.arange(self.width)
-        inside = 1 - ((at[:, None] - j) * (2 / self.width)) ** 2
-        kernel = i0(self.beta * np.sqrt(np.maximum(inside, 0)))
-        ends = self.width * np.arange(self.n + 1)
-        matrix = csr_array((kernel.ravel(), (j + self.beyond).ravel(), ends), shape=(self.n, self.size))
-        # of real numbers: twice as fast as of complex ones
-        return (matrix @ np.ascontiguousarray(values).view(np.float64)).view(np.complex128)
+        for first in range(0, self.n, ROWS):
+            to = at[first : first + ROWS]
+            low, high = math.ceil(to[0] - 0.5 * self.width), math.floor(to[-1] + 0.5 * self.width) + 1
+            inside = 1 - ((to[:, None] - np.arange(low, high)) * (2 / self.width)) ** 2
+            kernel = np.where(inside < 0, 0, i0(self.beta * np.sqrt(np.maximum(inside, 0))))
+            near = columns[low + self.beyond : high + self.beyond]
+            step = max(SERIAL // kernel.size, 1)
+            for start in range(0, out.shape[1], step):
+                np.matmul(kernel, near[:, start : start + step], out=out[first : first + ROWS, start : start + step])
+        return result
 
 
 def sums(plane: Plane, points: Reals, x: Reals, c: Complexes, eps: float) -> Complexes:

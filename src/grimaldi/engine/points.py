@@ -28,7 +28,7 @@ class Part(NamedTuple):
 def at_points(
     wave: Callable[[Receivers], Wave], scene: Scene, source: Source, points: NDArray[np.float64], block: int = BLOCK
 ) -> Iterator[Part]:
-    """One source's wave at points (n, 3), `block` of them after the other."""
+    """One source's wave at points (n, 3), `block` of them after the other; nobody may write to them."""
     import drjit as dr
 
     from grimaldi.diffraction.arrays import complex_array, types
@@ -39,7 +39,7 @@ def at_points(
     normals = surface_normals(scene, source)
     for first in range(0, len(points), block):
         which = slice(first, min(first + block, len(points)))
-        p = double.Vector(*(double.buffer(points[which, i]) for i in range(3)))
+        p = double.Vector(*(double.taken(points[which, i]) for i in range(3)))
         n = normals(p)
         u = wave(Receivers(p, n, dr.mask_t(p.x)(True)))
         dr.eval(u)
