@@ -1,8 +1,10 @@
 """A circular hole at a square of points: `grimaldi.field` beside a plain finufft script, and other libraries.
 
 The plain script is Barnett's method (JATIS 7(2) 021211) in its fewest lines: Fresnel's approximation, one wavelength,
-one hole, no bound of the error. LightPipes and diffractio are timed where --lightpipes and --diffractio name a Python
-that has them.
+one hole, no bound of the error. LightPipes and diffractio run where --lightpipes and --diffractio name a Python that
+has them, on the points' grid, --wider since light needs room beside the hole, and --finer if asked; their phase is
+compared but for a constant. All are held against the line integral at some of the points. Runs take turns, so that
+what else the machine does slows all of them.
 """
 
 from __future__ import annotations
@@ -10,8 +12,10 @@ from __future__ import annotations
 import argparse
 import statistics
 import subprocess
+import tempfile
 import time
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import finufft
@@ -25,28 +29,64 @@ from grimaldi.reference import circle
 Complex = NDArray[np.complex128]
 
 LIGHTPIPES = """
-import time, LightPipes as lp
-n, a, z, wavelength = {n}, {a}, {z}, {wavelength}
+import LightPipes as lp
 def run():
-    field = lp.CircAperture(lp.Begin(4 * a, wavelength, n), a)
-    return lp.Fresnel(field, z)
+    hole = lp.CircAperture(lp.Begin(n * step, wavelength, n), a)
+    return lp.Fresnel(hole, z).field
+assert abs(lp.Begin(n * step, wavelength, n).xvalues - x).max() < 1e-9 * a
 """
 DIFFRACTIO = """
-import time, numpy as np
 from diffractio.scalar_masks_XY import Scalar_mask_XY
-n, a, z, wavelength = {n}, {a}, {z}, {wavelength}
-x = np.linspace(-2 * a, 2 * a, n)
 def run():
-    mask = Scalar_mask_XY(x, x, wavelength)
-    mask.circle(r0=(0, 0), radius=a)
-    return mask.RS(z=z, new_field=True, verbose=False)
+    hole = Scalar_mask_XY(1e6 * x, 1e6 * x, 1e6 * wavelength)
+    hole.circle(r0=(0, 0), radius=1e6 * a)
+    return hole.RS(z=1e6 * z, new_field=True, verbose=False).u
 """
-TIMED = """
-times = []
-for _ in range({runs}):
-    start = time.perf_counter(); run(); times.append(time.perf_counter() - start)
-print(sorted(times)[{runs} // 2])
+SETUP = """
+import sys, time
+import numpy as np
+a, z, wavelength, finer = {a}, {z}, {wavelength}, {finer}
+n, step = {n} * finer * {wider}, {step} / finer
+asked = n // 2 + finer * (np.arange({n}) - {n} // 2)
+x = step * (np.arange(n) - n // 2)
 """
+SERVE = """
+run()
+while True:
+    line = sys.stdin.readline()
+    if not line:
+        break
+    start = time.perf_counter()
+    u = run()
+    seconds = time.perf_counter() - start
+    np.save(line.strip(), u[np.ix_(asked, asked)])
+    print("seconds", seconds, flush=True)
+"""
+
+
+class Other:
+    """Another library in a Python of its own, which waits for its turns."""
+
+    def __init__(self, python: str, text: str, folder: Path, **values: Any) -> None:
+        self.file = folder / "u.npy"
+        # what the library says of itself goes elsewhere
+        self.process = subprocess.Popen(
+            [python, "-c", SETUP.format(**values) + text + SERVE],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            text=True,
+        )
+
+    def __call__(self) -> tuple[float, Complex]:
+        """Seconds of a run, and U at the points."""
+        assert self.process.stdin is not None
+        assert self.process.stdout is not None
+        print(self.file, file=self.process.stdin, flush=True)
+        for line in self.process.stdout:
+            if line.startswith("seconds "):
+                return float(line.split()[1]), np.load(self.file).ravel()
+        raise SystemExit("a library failed: run its lines in this file by its own Python to see why")
 
 
 def script(a: float, z: float, wavelength: float, side: NDArray[np.float64], tolerance: float) -> Complex:
@@ -64,26 +104,23 @@ def script(a: float, z: float, wavelength: float, side: NDArray[np.float64], tol
     c = c * np.exp(-1j * k / z * middle * (x + y))
     u = finufft.nufft2d1(step * y, step * x, c, (n, n), isign=-1, eps=tolerance / 10)
     outer = np.exp(0.5j * k / z * side**2)
-    return u * (outer[:, None] * (outer * np.exp(1j * k * z)))
+    u *= outer[:, None]
+    u *= outer * np.exp(1j * k * z)
+    return u
 
 
-def median(run: Callable[[], Any], runs: int) -> float:
-    times = []
-    for _ in range(runs):
-        start = time.perf_counter()
-        run()
-        times.append(time.perf_counter() - start)
-    return statistics.median(times)
+def timed(run: Callable[[], Complex]) -> tuple[float, Complex]:
+    start = time.perf_counter()
+    u = run()
+    return time.perf_counter() - start, u
 
 
-def elsewhere(python: str | None, text: str, **values: Any) -> str:
-    """Seconds of another library's run in the environment that has it, as text."""
-    if python is None:
-        return "not run"
-    done = subprocess.run([python, "-c", (text + TIMED).format(**values)], capture_output=True, text=True)
-    if done.returncode:
-        return f"failed: {(done.stderr.strip().splitlines() or [''])[-1]}"
-    return f"{float(done.stdout.split()[-1]):.3f}"
+def errors(u: Complex, exact: Complex, turned: bool) -> dict[str, str]:
+    """How far u is from `exact`, where `turned` but for a constant phase."""
+    if turned:
+        u = u * np.exp(1j * np.angle(np.vdot(u, exact)))
+    off = np.abs(u - exact)
+    return {"largest error": f"{off.max():.2g}", "rms error": f"{np.sqrt((off**2).mean()):.2g}"}
 
 
 def main() -> None:
@@ -91,19 +128,22 @@ def main() -> None:
         description=(__doc__ or "").split("\n", 1)[0], formatter_class=argparse.ArgumentDefaultsHelpFormatter
     )
     parser.add_argument("--size", type=int, default=1024, help="points along a side")
-    parser.add_argument("--radius", type=float, default=0.5)
-    parser.add_argument("--distance", type=float, default=5e3)
-    parser.add_argument("--wavelength", type=float, default=2.2e-6)
+    parser.add_argument("--radius", type=float, default=0.05)
+    parser.add_argument("--distance", type=float, default=550.0)
+    parser.add_argument("--wavelength", type=float, default=5e-7)
     parser.add_argument("--half-side", type=float, default=None, help="of the square; the radius unless given")
     parser.add_argument("--tolerance", type=float, default=1e-6)
     parser.add_argument("--runs", type=int, default=5)
     parser.add_argument("--checks", type=int, default=50, help="points compared with the line integral")
+    parser.add_argument("--finer", type=int, default=1, help="times, the grid of the two libraries")
+    parser.add_argument("--wider", type=int, default=2, help="times, the square that they compute")
     parser.add_argument("--lightpipes", help="a Python that has LightPipes")
     parser.add_argument("--diffractio", help="a Python that has diffractio")
     args = parser.parse_args()
 
     a, z, wavelength, n = args.radius, args.distance, args.wavelength, args.size
-    side = (args.half_side or a) * np.linspace(-1, 1, n)
+    step = 2 * (args.half_side or a) / n
+    side = step * (np.arange(n) - n // 2)
     x, y = np.meshgrid(side, side)
     points = np.stack([x, y, np.full_like(x, z)], axis=-1).reshape(-1, 3)
     hole = grimaldi.PlanarOutline.ellipse(np.diag([a, a, 1, 1]))
@@ -120,22 +160,29 @@ def main() -> None:
     line = ours(points[chosen], 1e-2 * args.tolerance, precision="double", fast=False)
     axis = np.array([[0, 0, z]])
     on_axis = abs(abs(ours(axis, fast=False)[0]) - abs(circle.fresnel(a, z, wavelength)))
-    rows = []
-    for name, run in (("grimaldi.field", ours), ("plain finufft script", plain)):
-        u = run()  # the first run compiles
-        rows.append(
-            {
-                "": name,
-                "seconds": f"{median(run, args.runs):.3f}",
-                "largest error": f"{abs(u[chosen] - line).max():.2g}",
-            }
-        )
-    values = {"n": n, "a": a, "z": z, "wavelength": wavelength, "runs": args.runs}
-    for name, python, text in (
-        ("LightPipes, Fresnel", args.lightpipes, LIGHTPIPES),
-        ("diffractio, RS", args.diffractio, DIFFRACTIO),
-    ):
-        rows.append({"": name, "seconds": elsewhere(python, text, **values), "largest error": "not compared"})
+    values = {"n": n, "a": a, "z": z, "wavelength": wavelength, "step": step, "finer": args.finer, "wider": args.wider}
+    others = (("LightPipes, Fresnel", args.lightpipes, LIGHTPIPES), ("diffractio, RS", args.diffractio, DIFFRACTIO))
+    with tempfile.TemporaryDirectory() as folder:
+        ways: dict[str, Callable[[], tuple[float, Complex]]] = {
+            "grimaldi.field": lambda: timed(ours),
+            "plain finufft script": lambda: timed(plain),
+            **{name: Other(python, text, Path(folder), **values) for name, python, text in others if python},
+        }
+        times: dict[str, list[float]] = {name: [] for name in ways}
+        u = {name: run()[1] for name, run in ways.items()}  # the first run compiles
+        for _ in range(args.runs):
+            for name, run in ways.items():
+                times[name].append(run()[0])
+    us = statistics.median(times["grimaldi.field"])
+    rows = [
+        {
+            "": name,
+            "seconds": f"{statistics.median(times[name]):.3f}",
+            "over ours": f"{statistics.median(times[name]) / us:.2f}",
+            **errors(u[name][chosen], line, turned=isinstance(run, Other)),
+        }
+        for name, run in ways.items()
+    ]
     print(f"{n}² points, N = {a * a / wavelength / z:.3g}, tolerance {args.tolerance:g}, medians of {args.runs}\n")
     print(report.table(rows), end="\n\n")
     print(report.facts({"line integral beside Fresnel's on the axis": f"{on_axis:.2g}", **report.machine()}))

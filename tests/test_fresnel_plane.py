@@ -8,6 +8,8 @@ import pytest
 import grimaldi
 from grimaldi import PlanarOutline
 from grimaldi.diffraction import fresnel_plane as fast
+from grimaldi.diffraction import quadrature, transform
+from grimaldi.diffraction.lattice import lattice
 from grimaldi.diffraction.model import Options
 from grimaldi.errors import GrimaldiWarning, InputError
 from grimaldi.reference import circle
@@ -65,7 +67,7 @@ def acts(monkeypatch):
         return result
 
     monkeypatch.setattr("grimaldi.propagate.fresnel_plane", spied)
-    monkeypatch.setattr(fast, "_seconds", lambda *_: 0.0)
+    monkeypatch.setattr(fast, "seconds", lambda *_: 0.0)
     return answers
 
 
@@ -127,6 +129,26 @@ def test_the_bound_is_kept_wherever_it_acts(acts):
     assert served >= 4
 
 
+@pytest.mark.parametrize("hole", ["circle", "star", "mask"])
+def test_fine_lattices_are_interpolated_within_the_tolerance(hole, acts, monkeypatch):
+    """300 × 280 points where 60 × 60 would do, at N = 5: some of them along the outlines."""
+    a, z, tolerance = 6e4, 7.2e8, 1e-6
+    used = []
+    coarser = transform.coarser
+    monkeypatch.setattr(transform, "coarser", lambda *given: used.append(coarser(*given)) or used[-1])
+    scene = grimaldi.load({"type": "scene", "light": lights(z, 0)["plane"]}, outlines=holes(a)[hole])
+    points = grid(1.2 * a, z, (300, 280))
+    ours = grimaldi.field(scene, points, wavelength=WAVELENGTH, tolerance=tolerance)
+    assert acts == [True]
+    assert used[-1] is not None
+    chosen = np.random.default_rng(4).choice(len(points), 60, replace=False)
+    chosen[:4] = [0, 279, len(points) - 280, len(points) - 1]
+    line = grimaldi.field(scene, points[chosen], wavelength=WAVELENGTH, tolerance=1e-8, precision="double", fast=False)
+    off = abs(ours.U.values[0, 0, chosen] - line.U.values[0, 0])
+    assert (off <= ours.error.values[0, 0, chosen]).all()
+    assert float(ours.error.max()) <= tolerance
+
+
 def test_it_leaves_alone_what_it_cannot_do_within_the_tolerance(acts):
     a, z = 100.0, 1e5  # N = 0.1; over the points' square k d⁴/8z³ is 1e-4
     scene = grimaldi.load({"type": "scene", "light": lights(z, 0)["plane"]}, outlines=holes(a)["star"])
@@ -170,21 +192,57 @@ def test_quadrature_keeps_its_share(hole, tolerance):
 
     def transform(by):
         total, area = 0j, 0.0
-        for part in fast.patches(scene):
-            x, w = fast.nodes(part, part.rule(by * slope, tolerance))
+        for part in quadrature.patches(scene):
+            x, w = quadrature.nodes(part, part.rule(by * slope, tolerance))
             total, area = total + w @ np.exp(1j * slope * (x @ direction)), area + abs(part.area).sum()
         return total / area
 
     assert abs(transform(1) - transform(4)) <= tolerance
 
 
+@pytest.mark.parametrize("width", [4, 7, 11, 16])
+@pytest.mark.parametrize("n", [100, 101])
+def test_waves_of_any_length_in_the_band_are_interpolated(width, n):
+    band = 0.2
+    coarse = transform.Coarse.of(n, band, width)
+    assert coarse.spacing > 5
+    xi = np.linspace(-band, band, 41)
+    far, near = ((np.arange(count) - count // 2)[:, None] for count in (coarse.size, n))
+    got = coarse(np.exp(1j * xi * coarse.spacing * far) / coarse.spectrum(xi))
+    np.testing.assert_allclose(got, np.exp(1j * xi * near), rtol=0, atol=coarse.error)
+    assert coarse.error < 30 * abs(got - np.exp(1j * xi * near)).max() + 1e-13
+
+
+@pytest.mark.parametrize("eps", [1e-3, 1e-6, 1e-9, 1e-12])
+@pytest.mark.parametrize("bands", [(0.1, 0.2), (0.0, 0.3), (1.5, 2.0)])
+def test_sums_on_a_lattice_are_the_sums(bands, eps):
+    """Against the sums themselves; with all waves at the corners of the band, where they are hardest."""
+    rows, columns = 150, 131
+    coarse = transform.coarser(rows, columns, bands[0], bands[1], eps)
+    assert (coarse is None) == (bands == (1.5, 2.0))
+    random = np.random.default_rng(2)
+    for at in (random.uniform(-1, 1, (2, 300)), random.choice([-1, 1], (2, 300))):
+        a_row, a_point = np.array(bands)[:, None] * at
+        c = np.asarray(np.exp(2j * np.pi * random.uniform(size=300)) / 300, complex)
+        got = transform.on_lattice(rows, columns, a_row, a_point, c, eps)
+        row, column = np.arange(rows) - rows // 2, np.arange(columns) - columns // 2
+        exact = np.exp(1j * row[:, None] * a_row) @ (c[:, None] * np.exp(1j * np.outer(a_point, column)))
+        np.testing.assert_allclose(got, exact, rtol=0, atol=eps if coarse else fast.EXCESS * eps)
+
+
 def test_a_lattice_is_known_by_its_rows():
-    found = fast.lattice(grid(3.0, 1.0, (4, 7)) @ np.linalg.qr(np.random.default_rng(0).normal(size=(3, 3)))[0])
+    found = lattice(grid(3.0, 1.0, (4, 7)) @ np.linalg.qr(np.random.default_rng(0).normal(size=(3, 3)))[0])
     assert found is not None
     assert (found.rows, found.columns) == (4, 7)
-    moved = grid(3.0, 1.0, (4, 7))
-    moved[11, 0] += 1e-6
-    assert fast.lattice(moved) is None
+    for at in (3, 11, 27):
+        moved = grid(3.0, 1.0, (4, 7))
+        moved[at, 0] += 1e-6
+        assert lattice(moved) is None
+    large = grid(3.0, 1.0, (300, 257))  # more than are checked at a time
+    assert lattice(large) is not None
+    large[299 * 257 - 5, 2] += 1e-12
+    assert lattice(large) is None
+    assert lattice(grid(3.0, 1.0, (2, 5000))) is not None
 
 
 def test_options_carry_it():

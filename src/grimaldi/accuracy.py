@@ -31,10 +31,12 @@ class Misses:
 
     def add(self, source: Source, points: Reals, error: Reals, free: Reals) -> None:
         """Take in one source's estimated |U_computed - U| and its |U0| at points (n, 3)."""
+        self.of += len(points)
+        if not (error > self.tolerance * free).any():
+            return
         of_m = np.divide(error, free, out=np.zeros_like(error), where=free > 0)
         self.count += int((of_m > self.tolerance).sum())
-        self.of += len(points)
-        if len(of_m) and of_m.max() > self.worst:
+        if of_m.max() > self.worst:
             self.worst, self.source, self.point = float(of_m.max()), source, points[of_m.argmax()]
 
     def warn(self, scene: Scene) -> None:
@@ -66,8 +68,8 @@ def warn_of_faint_light(U: NDArray[np.complex128], free: Reals, tolerance: float
 
     U (wavelength, group, point); free (wavelength, point), the sum of all sources' |U0|.
     """
-    size, light = np.abs(U).sum(axis=1), free
-    faint = (light > 0) & (size < FEW * tolerance * light)
+    size, light = (np.abs(U[:, 0]) if U.shape[1] == 1 else np.abs(U).sum(axis=1)), free
+    faint = size < FEW * tolerance * light  # and so light > 0
     if not faint.size or faint.mean() <= 0.5:
         return
     typical = float(np.median(size[faint] / light[faint]))

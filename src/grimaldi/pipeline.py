@@ -94,8 +94,8 @@ def field(
     sources = loaded.sources if interference else separated(loaded.sources)
 
     names = groups(sources)
-    U = np.zeros((len(wavelengths), len(names), len(p)), complex)
-    error = np.zeros(U.shape)
+    fields: dict[tuple[int, int], NDArray[np.complex128]] = {}
+    error = np.zeros((len(wavelengths), len(names), len(p)))
     free = np.zeros((len(wavelengths), len(p)))
     misses = Misses(options.tolerance)
     with progress(len(wavelengths) * len(sources) * len(p), "field") as advance:
@@ -103,11 +103,13 @@ def field(
             for source in sources:
                 of = i, names.index(source.group)
                 for part in propagate_all(loaded, source, factor, 2 * np.pi / length, options, p):
-                    U[*of, part.which] += part.U
+                    fields[of] = _plus(fields.get(of), part.which, part.U, len(p))
                     error[*of, part.which] += part.error
                     free[i, part.which] += part.free
                     misses.add(source, p[part.which], part.error, part.free)
                     advance(len(part.U))
+    each = [fields[of] if of in fields else np.zeros(len(p), complex) for of in np.ndindex(error.shape[:2])]
+    U = (each[0] if len(each) == 1 else np.stack(each)).reshape(error.shape)
     if diffraction == "boundary":
         misses.warn(loaded)
         warn_of_faint_light(U, free, options.tolerance)
@@ -122,10 +124,22 @@ def field(
     return xr.Dataset(data, coords, attrs)
 
 
+def _plus(total: NDArray[Any] | None, which: Any, values: NDArray[Any], n: int) -> NDArray[Any]:
+    """`total` (n,), zeros if None, and `values` at some points; `values` themselves where they are all there is."""
+    if total is None:
+        if isinstance(which, slice) and len(values) == n:
+            return values
+        total = np.zeros(n, values.dtype)
+    total[which] += values
+    return total
+
+
 def checked_points(points: ArrayLike) -> NDArray[np.float64]:
-    """Points as (n, 3) float64; InputError where they are not that, or not finite."""
+    """A copy of points as (n, 3) float64, column by column; InputError where they are not that, or not finite."""
+    from grimaldi.diffraction.arrays import aligned_empty
+
     try:
-        p = np.array(points, dtype=np.float64)
+        p = np.asarray(points, dtype=np.float64)
     except (TypeError, ValueError):
         raise InputError("points: not numbers; give an array of shape (n, 3)") from None
     if p.shape == (3,):
@@ -135,4 +149,6 @@ def checked_points(points: ArrayLike) -> NDArray[np.float64]:
     if not np.isfinite(p).all():
         row = int(np.flatnonzero(~np.isfinite(p).all(axis=1))[0])
         raise InputError(f"points: row {row} is not finite; give numbers")
-    return p
+    columns = aligned_empty(p.size, np.float64).reshape(3, -1)
+    columns[...] = p.T
+    return columns.T

@@ -12,8 +12,9 @@ import numpy as np
 from grimaldi.diffraction.boundary import boundary
 from grimaldi.diffraction.curves import phase_allowed
 from grimaldi.diffraction.frame import incident
-from grimaldi.diffraction.fresnel_plane import fresnel_plane, planes
+from grimaldi.diffraction.fresnel_plane import fresnel_plane
 from grimaldi.diffraction.model import Evaluate, Factor, Model, Options, Receivers
+from grimaldi.diffraction.planes import planes
 from grimaldi.diffraction.reach import reach
 from grimaldi.diffraction.screen import beyond
 from grimaldi.engine.points import Part, at_points

@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 
 from grimaldi.variants import check_variant
 
+ALIGNED = 128  # bytes
+
 
 class Types(NamedTuple):
     """Array types of one precision."""
@@ -22,16 +24,32 @@ class Types(NamedTuple):
     def buffer(self, values: NDArray[Any]) -> Any:
         """Numbers as one flat device buffer."""
         dtype = np.float64 if dr.itemsize_v(self.Float) == 8 else np.float32
-        return self.Float(_aligned(np.asarray(values, dtype).ravel()))
+        copy = aligned_empty(values.size, dtype)
+        copy.reshape(values.shape)[...] = values
+        return self.Float(copy)
+
+    def taken(self, values: NDArray[Any]) -> Any:
+        """The same of an array that nobody writes to any more: where it may be read in place, no copy."""
+        flat = values.ravel()
+        in_place = dr.itemsize_v(self.Float) == values.itemsize and flat.ctypes.data % ALIGNED == 0
+        return self.Float(flat) if in_place else self.buffer(flat)
 
 
-def _aligned(values: NDArray[Any]) -> NDArray[Any]:
-    """A copy at a multiple of 128: Dr.Jit reads NumPy's memory in place, and compiles its alignment into kernels."""
-    room = np.empty(values.nbytes + 128, np.uint8)
-    first = -room.ctypes.data % 128
-    copy = room[first : first + values.nbytes].view(values.dtype)
-    copy[:] = values
-    return copy
+def aligned_empty(count: int, dtype: Any) -> NDArray[Any]:
+    """Memory as `buffer` needs it: Dr.Jit reads NumPy's in place, and compiles its alignment into kernels."""
+    size = count * np.dtype(dtype).itemsize
+    room = np.empty(size + ALIGNED, np.uint8)
+    first = -room.ctypes.data % ALIGNED
+    return room[first : first + size].view(dtype)
+
+
+def complex_array(real: Any, imag: Any) -> NDArray[np.complex128]:
+    """Two Dr.Jit arrays as one NumPy array."""
+    dr.eval(real, imag)  # in one kernel
+    dr.eval(real, imag)  # in one kernel
+    z = np.empty(len(real), np.complex128)
+    z.real, z.imag = real.numpy(), imag.numpy()
+    return z
 
 
 def on_device(kind: Any, number: float) -> Any:

@@ -28,10 +28,10 @@ class Part(NamedTuple):
 def at_points(
     wave: Callable[[Receivers], Wave], scene: Scene, source: Source, points: NDArray[np.float64], block: int = BLOCK
 ) -> Iterator[Part]:
-    """One source's wave at points (n, 3), `block` of them after the other."""
+    """One source's wave at points (n, 3), `block` of them after the other; nobody may write to them."""
     import drjit as dr
 
-    from grimaldi.diffraction.arrays import types
+    from grimaldi.diffraction.arrays import complex_array, types
     from grimaldi.diffraction.model import Receivers
     from grimaldi.diffraction.occlusion import surface_normals
 
@@ -39,8 +39,8 @@ def at_points(
     normals = surface_normals(scene, source)
     for first in range(0, len(points), block):
         which = slice(first, min(first + block, len(points)))
-        p = double.Vector(*(double.buffer(points[which, i]) for i in range(3)))
+        p = double.Vector(*(double.taken(points[which, i]) for i in range(3)))
         n = normals(p)
         u = wave(Receivers(p, n, dr.mask_t(p.x)(True)))
         dr.eval(u)
-        yield Part(which, u.real.numpy() + 1j * u.imag.numpy(), u.error.numpy(), u.free.numpy())
+        yield Part(which, complex_array(u.real, u.imag), u.error.numpy(), u.free.numpy())

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from grimaldi.diffraction.model import Factor, Receivers
-from grimaldi.engine.lattice import LARGEST, Lattice, Nodes, lattice
+from grimaldi.engine.cells import LARGEST, Cells, Nodes, cells
 from grimaldi.light import Beam, Light, Reflected
 from grimaldi.tracing import trace
 
@@ -25,7 +25,7 @@ mi: Any = mitsuba  # the stubs refuse numbers where arrays are asked for
 
 ASKED = 1 << 16  # rays of a tile at whose ends the model is asked for M: about a second of work
 RAYS = 1 << 21  # of a tile in all: some hundred bytes each
-NODES = 1 << 23  # of the lattices of M of a band of the film: some twenty bytes each
+NODES = 1 << 23  # of the cells of a band of the film: some twenty bytes each
 
 
 @dataclass
@@ -72,11 +72,11 @@ class Tile:
 
 @dataclass(frozen=True, eq=False)
 class Band:
-    """Some rows of the film, and M over them of each beam, where it is interpolated."""
+    """Some rows of the film, and M of each beam over them, where it is interpolated."""
 
     top: int
     rows: int
-    lattices: tuple[Lattice, ...]
+    cells: tuple[Cells, ...]
 
 
 def bands(light: Light, sensor: Any, shot: Shot) -> Iterator[Band]:
@@ -92,13 +92,13 @@ def bands(light: Light, sensor: Any, shot: Shot) -> Iterator[Band]:
     for top in range(0, shot.height, step):
         rows = min(step, shot.height - top)
         nodes = (partial(_nodes, light, beam, sensor, shot) for beam in light.beams)
-        yield Band(top, rows, tuple(lattice(ask, shot.width, top, rows, finest, light.interpolated) for ask in nodes))
+        yield Band(top, rows, tuple(cells(ask, shot.width, top, rows, finest, light.interpolated) for ask in nodes))
 
 
 def tiles(light: Light, shot: Shot, band: Band) -> Iterator[tuple[int, int]]:
     """First pixel and number of pixels of each tile of a band."""
     pixels = shot.width * band.rows
-    asked = sum(min(m.unknown / pixels, 1) for m in band.lattices) if band.lattices else float(light.asks)
+    asked = sum(min(m.unknown / pixels, 1) for m in band.cells) if band.cells else float(light.asks)
     step = int(max(min(RAYS, ASKED / max(asked, 1e-9)) // shot.spp, 1))
     first = band.top * shot.width
     for begin in range(0, pixels, step):
@@ -140,7 +140,7 @@ def render_tile(light: Light, sensor: Any, shot: Shot, first: int, pixels: int, 
 
     def reflected(ray: Any, si: Any, bsdf: Any, n: Any, active: Any, first: Any) -> Reflected:
         known = []
-        for m in () if band is None else band.lattices:
+        for m in () if band is None else band.cells:
             shape: Any = dr.reinterpret_array(mi.UInt32, si.shape)
             found = m.at(film.x, film.y, si.t, shape, active & first)
             known.append((Factor(found.real, found.imag, found.error), found.holds))

@@ -52,7 +52,7 @@ class Known(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Lattice:
+class Cells:
     """The cells of some rows of a film, and what their nodes say."""
 
     grid: _Grid
@@ -115,8 +115,8 @@ class _Level(NamedTuple):
     error: Any
 
 
-def lattice(evaluate: Evaluate, width: int, top: int, rows: int, finest: int, share: float) -> Lattice:
-    """The lattice of `rows` rows of a film `width` pixels wide, from row `top` on, which `LARGEST` divides.
+def cells(evaluate: Evaluate, width: int, top: int, rows: int, finest: int, share: float) -> Cells:
+    """The cells of `rows` rows of a film `width` pixels wide, from row `top` on, which `LARGEST` divides.
 
     Cells are `finest` pixels or more across, a power of two; share: of interpolation in |M_computed - M|.
     """
@@ -240,7 +240,7 @@ def _quarters(x: Any, y: Any, size: int) -> tuple[Any, Any]:
     return dr.gather(mi.UInt32, x, of) + (part & 1) * size, dr.gather(mi.UInt32, y, of) + ((part >> 1) & 1) * size
 
 
-def _by_pixel(nodes: _Nodes, grid: _Grid, levels: list[_Level], pixels: int, rows: int) -> Lattice:
+def _by_pixel(nodes: _Nodes, grid: _Grid, levels: list[_Level], pixels: int, rows: int) -> Cells:
     """Each pixel's cell."""
     index = dr.arange(mi.UInt32, pixels * rows)
     y = index // grid.pixels
@@ -255,4 +255,4 @@ def _by_pixel(nodes: _Nodes, grid: _Grid, levels: list[_Level], pixels: int, row
     shape = dr.gather(mi.UInt32, nodes.shape, first, size > 0)
     unknown: Any = dr.count(size == 0)
     dr.eval(size, error, shape, unknown)
-    return Lattice(grid, nodes.values, size, shape, error, int(unknown[0]))
+    return Cells(grid, nodes.values, size, shape, error, int(unknown[0]))
