@@ -24,10 +24,10 @@ def picture(pixels: int, settings: Settings) -> Result:
     pixel = float(x[1] - x[0])
 
     def whole() -> np.ndarray:
-        return disc.footprints(x, y, pixel, *disc.radial(loaded, np.hypot(disc.HALF, disc.HALF)))
+        return disc.exact(loaded, x, y)[2]
 
     (time,) = medians(settings.runs, whole)
-    points, error = disc._check(loaded, whole(), x, y, pixel)
+    points, error = disc.check(loaded, whole(), x, y, pixel)
     line = {"pixels": f"{pixels}²", "time": written(time), "error of the mean intensity": f"{error:.1g}"}
     text = (
         "A coherent disc of radius 7000/6 λ, 10000/6 λ away: the mean of |U|² over each pixel, about 1, warm. The "

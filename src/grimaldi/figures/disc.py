@@ -112,7 +112,7 @@ def draw(settings: Settings) -> Figure:
     clock = Clock()
     rho, intensity, means = exact(loaded, x, y)
     exact_time = str(clock)
-    by_force, error = _check(loaded, means, x, y, pixel)
+    by_force, error = check(loaded, means, x, y, pixel)
 
     clock = Clock()
     samples = {"diffraction": "area", "n": SAMPLES, "wavelength": 1.0}
@@ -194,7 +194,7 @@ def draw(settings: Settings) -> Figure:
     )
 
 
-def _check(loaded: Any, means: Reals, x: Reals, y: Reals, pixel: float) -> tuple[int, float]:
+def check(loaded: Any, means: Reals, x: Reals, y: Reals, pixel: float) -> tuple[int, float]:
     """How many points in each of three pixels, and by how much their mean |U|² differs from `means` at most."""
     across, worst = 96, 0.0
     offsets = pixel * ((np.arange(across) + 0.5) / across - 0.5)
