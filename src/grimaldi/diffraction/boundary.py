@@ -30,6 +30,7 @@ from grimaldi.scene.model import Scene, Source
 
 mi: Any = mitsuba  # the stubs refuse numbers where arrays are asked for
 
+AS_ONE = 4.0  # rad at a tolerance of 1: half of what a run of pieces subtends that is tested by one ray X→P
 UNASKED = 0.3  # of the tolerance: what all pieces whose X→P goes untested may add to M, each the same
 
 
@@ -160,7 +161,8 @@ def _bodies(problem: Problem, precision: Types) -> Evaluate:
     scene, source, outline, k, options, grazed = problem
     rule = problem.rule()
     probe = rays(scene, source, outline.sag)
-    tab = table(outline, source, precision, coarse=coarseness(options.tolerance))
+    tolerance = options.tolerance
+    tab = table(outline, source, precision, coarse=coarseness(tolerance), angle=AS_ONE * tolerance)
     n_pieces = int(tab.n_pieces[0])
     grazing = None if grazed is None else chords(grazed, tab.centre, precision)
 
@@ -171,7 +173,7 @@ def _bodies(problem: Problem, precision: Types) -> Evaluate:
             tab,
             tab.device(k),
             rule,
-            UNASKED * options.tolerance / n_pieces,
+            UNASKED * tolerance / n_pieces,
             probe if options.occlusion != "none" else None,
             None if grazing is None else near(fr, grazing, tab.device(k), receivers),
             options.rim == "smooth",

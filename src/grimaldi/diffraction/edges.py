@@ -22,7 +22,6 @@ from grimaldi.diffraction.occlusion import Rays
 from grimaldi.diffraction.segment import Corners, Line, Rule, Wave, growth, line, path, segment_wave
 from grimaldi.diffraction.table import Piece, Segment, Table
 
-ANGLE = 0.08  # rad, half of what a run of pieces subtends at most to be heard or not as one
 NEVER = Corners(0.0, 0.0, float("inf"))  # for traces where corners are not asked
 
 
@@ -225,7 +224,7 @@ def visit(fr: Frame, tab: Table, i: Any) -> tuple[Any, Any, Any]:
     item = tab.tree.item_of(i)
     x = centre - fr.foot
     d2 = dr.squared_norm(x) - dr.square(dr.dot(x, fr.a))
-    whole = (item < tab.n_pieces) | ((item != NONE) & (dr.square(radius) < ANGLE * ANGLE * d2))
+    whole = (item < tab.n_pieces) | ((item != NONE) & (dr.square(radius) < dr.square(tab.angle) * d2))
     return item, inside & whole, inside & ~whole
 
 

@@ -8,11 +8,10 @@ import numpy as np
 from grimaldi.diffraction.arrays import types
 from grimaldi.diffraction.boundary import Problem, unoccluded
 from grimaldi.diffraction.model import Options
-from grimaldi.diffraction.table import MANY
+from grimaldi.diffraction.table import MANY, cut
 from grimaldi.outlines.model import Outline, Reals
 from grimaldi.scene.model import Scene, Source
 
-FEW = 2 * MANY  # segments, which are all summed
 POINTS = 64  # where it is measured
 LEFT_OUT = 0.2  # of the tolerance, at most at these points
 LADDER = 2.0 ** np.arange(5, 15)  # of kΔ
@@ -24,7 +23,7 @@ def reach(scene: Scene, source: Source, outline: Outline, k: float, options: Opt
     Waves of far edges come from corners and the ends of bodies and are as good as random in phase, unless bodies stand
     in a lattice; there this tells. Infinite where everything counts.
     """
-    if scene.screen or len(outline) < FEW or len(where) == 0:
+    if scene.screen or len(where) == 0 or len(outline) < MANY or len(cut(outline)) < MANY:
         return np.inf
     points = where[np.linspace(0, len(where) - 1, min(POINTS, len(where))).astype(int)]
     rungs = np.append(LADDER / k, 1e30)

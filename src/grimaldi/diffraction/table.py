@@ -55,6 +55,7 @@ class Table(NamedTuple):
     pieces: Any
     tree: Tree  # of pieces and runs
     far: Any  # what lies at a larger Δ adds nothing
+    angle: Any  # half of what a run of pieces subtends at most about the ray, to reach the receiver or not as one [rad]
     types: Types
 
     def device(self, number: float) -> Any:
@@ -138,6 +139,7 @@ def table(
     types: Types,
     ranges: NDArray[np.int64] | None = None,
     coarse: float = 1.0,
+    angle: float = 0.0,
 ) -> Table:
     """Pack what a source sees; its pieces begin at the segments `ranges`, the last of which is their number (`cut`)."""
     ends = np.concatenate([outline.start, outline.end])
@@ -174,12 +176,13 @@ def table(
         float(np.linalg.norm(np.concatenate([X0, X1]), axis=1).max()),
         np.inf if source.position is None else float(outline.distances(source.position).min()),
         on_device(index, len(outline)),
-        on_device(index, int(np.count_nonzero(plan.end == plan.begin + 1))),
+        on_device(index, len(plan.order)),
         types.buffer(segments),
         index(runs.ravel().astype(np.uint32)),
         types.buffer(pieces),
         plan.tree(item, types),
         on_device(types.Float, min(outline.far, 1e30)),
+        on_device(types.Float, angle),
         types,
     )
 

@@ -21,6 +21,8 @@ mi: Any = mitsuba  # the stubs refuse numbers where arrays are asked for
 LARGEST = 16  # pixels across the largest cells
 HALVED = 0.25  # what halving a cell leaves of a quadratic's error, at most
 STRAIGHT = 0.5  # what a quadratic leaves of a bilinear function's error, at most
+SIMPSON = 1 / 6, 4 / 6, 1 / 6  # means of quadratics
+IN_PIXEL = 10  # times a mean's error, that M may be off by within a pixel
 DEPTH = 1e-4  # of the distance from the camera, that a surface may lie off the cell's
 
 
@@ -174,7 +176,11 @@ def _judged(nodes: _Nodes, grid: _Grid, x: Any, y: Any, size: int, finest: int, 
         error = dr.maximum(error, dr.gather(mi.Float, nodes.error, i))
     c00, c10, c20, c01, c11, c21, c02, c12, c22 = own
     bent = [c10 - 0.5 * (c00 + c20), c01 - 0.5 * (c00 + c02), c21 - 0.5 * (c20 + c22), c12 - 0.5 * (c02 + c22)]
-    left = STRAIGHT * _largest([*bent, c11 - 0.25 * (c00 + c20 + c02 + c22)])
+    bent.append(c11 - 0.25 * (c00 + c20 + c02 + c22))
+    left, mean = (
+        STRAIGHT * _largest(bent),
+        STRAIGHT * _length((bent[0] + bent[1] + bent[2] + bent[3] + 4 * bent[4]) / 9),
+    )
     if size < LARGEST:
         around = x & ~mi.UInt32(2 * size - 1), y & ~mi.UInt32(2 * size - 1)
         coarse = _gathered(nodes, grid, *around, 2 * size)
@@ -186,12 +192,17 @@ def _judged(nodes: _Nodes, grid: _Grid, x: Any, y: Any, size: int, finest: int, 
         rows = [_quadratic(b + 0.25 * n) for n in range(3)]
         misses = [own[3 * n + m] - _sum(coarse, columns[m], rows[n]) for n in range(3) for m in range(3)]
         left = dr.select(predicted, HALVED * _largest(misses), left)
-    serves = same & (left <= dr.opaque(mi.Float, share))
+        mean = dr.select(predicted, HALVED * _length(_sum(misses, SIMPSON, SIMPSON)), mean)
+    most = dr.opaque(mi.Float, share)
     if size > finest:
         clear = mi.Float(dr.inf)
         for c in own:
             clear = dr.minimum(clear, c.w)
-        serves &= clear > size
+        serves = same & (left <= most) & (clear > size)
+    elif size > 1:
+        serves = same & (left <= most)
+    else:
+        serves = same & (mean <= most) & (left <= IN_PIXEL * most)
     error += left
     dr.eval(serves, error)
     return serves, error
@@ -200,6 +211,11 @@ def _judged(nodes: _Nodes, grid: _Grid, x: Any, y: Any, size: int, finest: int, 
 def _gathered(nodes: _Nodes, grid: _Grid, x: Any, y: Any, size: int) -> list[Any]:
     """The values of cells' nodes, row by row."""
     return [dr.gather(mi.Array4f, nodes.values, grid.node(x, y, size, m, n)) for n in range(3) for m in range(3)]
+
+
+def _length(d: Any) -> Any:
+    """|M| of a difference."""
+    return dr.sqrt(dr.fma(d.x, d.x, d.y * d.y))
 
 
 def _largest(differences: list[Any]) -> Any:
