@@ -103,8 +103,8 @@ def test_no_point_of_a_sphere_has_a_smaller_detour_than_its_bound():
 
 @pytest.fixture(scope="module")
 def crowd() -> tuple[grimaldi.Scene, Reals]:
-    """Two hundred bodies over a floor, and points of it under their middle."""
-    return grimaldi.load(scenes.bodies(200, seed=4, joined=True)), scenes.floor_points(400, seed=4)
+    """Eight hundred bodies over a floor, and points of it under their middle."""
+    return grimaldi.load(scenes.bodies(800, seed=4, joined=True)), scenes.floor_points(400, seed=4)
 
 
 def factors(scene: Any, points: Reals, outline: Any, options: Options) -> NDArray[np.complex128]:
