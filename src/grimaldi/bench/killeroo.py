@@ -19,7 +19,7 @@ def measure(settings: Settings) -> Result | Skipped:
         return Skipped("the benchmark data is not at hand; give its folder by --data")
     if settings.quick:
         return compare(path, Film(48, 1, settings.seed), Film(24, 1, settings.seed), settings.runs)
-    return compare(path, Film(700, 16, settings.seed), Film(settings.reference, 16, settings.seed), settings.runs)
+    return compare(path, Film(700, 16, settings.seed), Film(settings.reference, 4, settings.seed), settings.runs)
 
 
 def compare(path: Any, film: Film, small: Film, runs: int) -> Result:

@@ -55,7 +55,7 @@ class Settings:
     seed: int = 0
     runs: int = 5
     data: Path | None = None
-    reference: int = 175
+    reference: int = 88
     peers: str | None = None
     quick: bool = False
 

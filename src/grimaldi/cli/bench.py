@@ -21,7 +21,7 @@ def bench(
     quick: Annotated[bool, typer.Option("--quick", help="Small sizes: to see that all works.")] = False,
     reference: Annotated[
         int, typer.Option(help="Side of the film on which pictures are held against tolerance 1e-4.", metavar="PIXELS")
-    ] = 175,
+    ] = 88,
     output: Annotated[
         Path | None,
         typer.Option("--output", "-o", help="Write performance.md, of these rows, into this folder.", metavar="DIR"),

@@ -59,7 +59,7 @@ Epsilon = Annotated[
 Fast = Annotated[
     bool | None,
     typer.Option(
-        "--fast/--no-fast", help="Whether points on a plane behind holes may be summed by one FFT, within tolerance."
+        "--fast/--no-fast", help="Whether one FFT may serve a plane behind holes, and M be interpolated over a picture."
     ),
 ]
 Smooth = Annotated[

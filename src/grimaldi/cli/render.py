@@ -28,6 +28,7 @@ def render(
     n: options.N = None,
     weights: options.Weights = None,
     epsilon: options.Epsilon = None,
+    fast: options.Fast = None,
     max_depth: Annotated[int | None, typer.Option(help="Longest camera path; 2 is direct light.")] = None,
     spp: Annotated[int | None, typer.Option(help="Samples per pixel.  [default: the scene's]")] = None,
     size: Annotated[
@@ -59,6 +60,7 @@ def render(
         n=options.number(n),
         weights=weights,
         epsilon=epsilon,
+        fast=fast,
         smooth=smooth,
         max_depth=max_depth,
         spp=spp,

@@ -166,7 +166,7 @@ def table(
     pieces = np.concatenate(
         [
             *(target, reach, normals[:, 0], closed, normals[:, 1], of, outline.outward[middle], behind),
-            *((X1 - X0)[first] / length[first], zero[: len(middle)]),
+            *((X1 - X0)[first] / length[first], np.zeros((len(middle), 1))),
         ],
         1,
     )
