@@ -18,7 +18,7 @@ LADDER = 2.0 ** np.arange(5, 15)  # of kΔ
 
 
 def reach(scene: Scene, source: Source, outline: Outline, k: float, options: Options, where: Reals) -> float:
-    """Δ from which on what is left out changes M by a third of the tolerance or so at most, at some of the points (n, 3).
+    """Δ from which on what is left out changes M by `LEFT_OUT` of the tolerance at most, at some points (n, 3).
 
     Waves of far edges come from corners and the ends of bodies and are as good as random in phase, unless bodies stand
     in a lattice; there this tells. Infinite where everything counts.
