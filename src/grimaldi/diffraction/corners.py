@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import drjit as dr
 
-from grimaldi.diffraction.frame import Frame
+from grimaldi.diffraction.frame import Frame, way
 from grimaldi.diffraction.segment import Corners, sincos
 
 
@@ -48,30 +48,18 @@ def corner(frame: Frame, X: Any, k: Any) -> Corner:
     q = x - h * frame.a
     d2 = dr.squared_norm(q)
     z2 = frame.z2 - h
-    to_p2 = dr.fma(z2, z2, d2)
-    inv_s = dr.rsqrt(to_p2)
     between = z2 > 0
-    delta = _excess(z2, d2, inv_s)
-    along = delta * inv_s
+    delta, along, inv = way(z2, d2)
     if frame.plane:
-        inv, C = inv_s, 0.5 + 0.5 * z2 * inv_s
+        C = 0.5 + 0.5 * z2 * inv
     else:
         z1 = frame.z1 + h
         between &= z1 > 0
-        inv_r = dr.rsqrt(dr.fma(z1, z1, d2))
-        beyond = _excess(z1, d2, inv_r)
-        delta += beyond
-        along -= beyond * inv_r
-        inv = inv_r + inv_s
-        C = 0.5 + 0.5 * (z1 * z2 - d2) * inv_r * inv_s
+        delta_r, along_r, inv_r = way(z1, d2)
+        C = 0.5 + 0.5 * (z1 * z2 - d2) * inv_r * inv
+        delta, along, inv = delta + delta_r, along - along_r, inv + inv_r
     sin, cos = sincos(k * delta)
-    return Corner(q, h, d2, along, inv, C, cos, sin, dr.select(between, d2, dr.inf), to_p2)
-
-
-def _excess(z: Any, d2: Any, inv: Any) -> Any:
-    """√(z² + d²) - z, of which `inv` is 1/√(z² + d²)."""
-    reach = dr.rcp(inv) + dr.abs(z)
-    return dr.select(z > 0, d2 / reach, reach)
+    return Corner(q, h, d2, along, inv, C, cos, sin, dr.select(between, d2, dr.inf), dr.fma(z2, z2, d2))
 
 
 def between(ray: Any, a: Corner, b: Corner, k: Any, rule: Corners) -> Ends:

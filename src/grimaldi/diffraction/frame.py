@@ -75,6 +75,15 @@ def frame(source: Source, p: Any, table: Table, screen: PlanarOutline | None = N
     return Frame(out.Vector(a), out.Vector(foot), out.Float(z1), out.Float(z2), out.Float(lever), source.is_plane)
 
 
+def way(z: Any, d2: Any) -> tuple[Any, Any, Any]:
+    """√(z² + d²) - z without cancellation, the same over √(z² + d²), and 1/√(z² + d²)."""
+    length2 = dr.maximum(dr.fma(z, z, d2), 1e-30)
+    inv = dr.rsqrt(length2)
+    reach = length2 * inv + dr.abs(z)
+    excess = dr.select(z > 0, d2 / reach, reach)
+    return excess, excess * inv, inv
+
+
 def incident(source: Source, p: Any, k: float) -> tuple[Any, Any, Any]:
     """U0 at p (Float64) by eq. 1-2: its modulus, cosine and sine of its phase, reduced in Float64."""
     V = types(double=True).Vector

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from grimaldi.diffraction.arrays import Types, on_device
-from grimaldi.diffraction.frame import Frame
+from grimaldi.diffraction.frame import Frame, way
 
 CHILDREN = 2
 BITS = 10  # of each coordinate, by which neighbours are found
@@ -123,18 +123,9 @@ def least_detour(frame: Frame, centre: Any, radius: Any) -> Any:
     h = dr.dot(x, frame.a)
     d2 = dr.maximum(dr.squared_norm(x) - h * h, 0)
     z2 = frame.z2 - h
-    delta, along, inv = _way(z2, d2)
+    delta, along, inv = way(z2, d2)
     if not frame.plane:
         z1 = frame.z1 + h
-        delta_r, along_r, inv_r = _way(z1, d2)
+        delta_r, along_r, inv_r = way(z1, d2)
         delta, along, inv = delta + delta_r, along - along_r, inv + inv_r
     return delta - radius * dr.sqrt(dr.fma(along, along, d2 * inv * inv))
-
-
-def _way(z: Any, d2: Any) -> tuple[Any, Any, Any]:
-    """√(z² + d²) - z, what of ∇ of it lies along the ray, and 1/√(z² + d²)."""
-    length2 = dr.maximum(dr.fma(z, z, d2), 1e-30)
-    inv = dr.rsqrt(length2)
-    reach = length2 * inv + dr.abs(z)
-    excess = dr.select(z > 0, d2 / reach, reach)
-    return excess, excess * inv, inv
