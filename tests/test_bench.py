@@ -230,7 +230,7 @@ def test_another_library_takes_its_turns_at_the_same_points(tmp_path):
         other.close()
     assert points.shape == (64, 3)
     assert seconds["other"] > 0
-    assert errors["other"] < 1e-12
+    assert errors["other"] < 1e-9  # a wider square is another sum, to the same tolerance
     assert planar._error(1j * exact, exact, turned=False) > 1
 
 
