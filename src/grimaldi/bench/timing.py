@@ -5,7 +5,10 @@ from __future__ import annotations
 import statistics
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any, TypeVar
+
+from grimaldi.scene.model import Scene
 
 T = TypeVar("T")
 
@@ -32,3 +35,8 @@ def medians(runs: int, *works: Callable[[], Any]) -> tuple[float, ...]:
 def written(value: float) -> str:
     """A time as a table shows it."""
     return f"{value:.3g} s"
+
+
+def anew(scene: Scene) -> Scene:
+    """The same scene without what is remembered with it, such as its outlines."""
+    return replace(scene)

@@ -8,7 +8,7 @@ import grimaldi
 from grimaldi.bench.error import field_error
 from grimaldi.bench.model import Result, Settings, Target
 from grimaldi.bench.scenes import WAVELENGTH, box, floor_points
-from grimaldi.bench.timing import medians, written
+from grimaldi.bench.timing import anew, medians, written
 from grimaldi.scene.model import Scene
 
 SPLITS = (9, 29, 91, 289)  # of a box's edges: 1e3, 1e4, 1e5 and 1e6 triangles
@@ -28,10 +28,10 @@ def refine(splits: Sequence[int], points: int, settings: Settings) -> Result:
     where = floor_points(points, settings.seed)
 
     def field(scene: Scene) -> None:
-        grimaldi.field(scene, where, wavelength=WAVELENGTH, tolerance=TOLERANCE)
+        grimaldi.field(anew(scene), where, wavelength=WAVELENGTH, tolerance=TOLERANCE)
 
     times = medians(settings.runs, *(lambda scene=scene: field(scene) for scene in scenes))
-    outlines = medians(settings.runs, *(lambda scene=scene: grimaldi.outline(scene) for scene in scenes))
+    outlines = medians(settings.runs, *(lambda scene=scene: grimaldi.outline(anew(scene)) for scene in scenes))
     lines = tuple(
         {
             "triangles": f"{12 * split**2:,}",

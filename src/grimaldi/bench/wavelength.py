@@ -6,7 +6,7 @@ import grimaldi
 from grimaldi.bench.error import field_error
 from grimaldi.bench.model import Result, Settings, Target
 from grimaldi.bench.scenes import box, floor_points
-from grimaldi.bench.timing import medians, written
+from grimaldi.bench.timing import anew, medians, written
 
 LONGEST = 0.1
 SHORTER = 100
@@ -26,7 +26,7 @@ def shorten(points: int, settings: Settings) -> Result:
     wavelengths = (LONGEST, LONGEST / SHORTER)
 
     def field(wavelength: float) -> None:
-        grimaldi.field(scene, where, wavelength=wavelength, tolerance=TOLERANCE)
+        grimaldi.field(anew(scene), where, wavelength=wavelength, tolerance=TOLERANCE)
 
     times = medians(settings.runs, *(lambda wavelength=wavelength: field(wavelength) for wavelength in wavelengths))
     lines = tuple(
