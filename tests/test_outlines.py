@@ -12,15 +12,13 @@ import numpy as np
 import oracle
 import pytest
 from numpy.typing import NDArray
-from optics import GREY, emitter, factor, line, mesh
+from optics import factor, line, mesh
 
 import grimaldi
-from grimaldi.diffraction.boundary import boundary
-from grimaldi.diffraction.model import Options, Receivers
 from grimaldi.errors import InputError
 from grimaldi.outlines.chains import chains
 from grimaldi.outlines.extract import edges_of, outline, sight_of, soup_of
-from grimaldi.outlines.merging import merged, runs
+from grimaldi.outlines.merging import runs
 from grimaldi.outlines.overlaps import Index
 from grimaldi.outlines.silhouettes import silhouettes
 from grimaldi.scene.model import Body, Mesh, Scene, Source, Sphere
@@ -290,30 +288,6 @@ def test_runs_keep_ways_back_and_breaks():
     assert list(runs(x[:-1], x[1:], np.zeros(2, bool), np.full(3, 0.1))) == [0, 2]
     straight = np.arange(6.0)[:, None] * [1, 0, 0]
     assert list(runs(straight[:-1], straight[1:], np.array([False, True, False, False]), np.zeros(5))) == [0, 2]
-
-
-@pytest.mark.parametrize("sag", [1e-3, 4e-3])
-def test_merging_changes_the_field_by_no_more_than_its_phase(sag):
-    """A disc's rim in coarser chords: they lie inside it by 2/3 sag in the mean, so Δ errs by |∇Δ| of that at most."""
-    light, k = oracle.Spherical((1, 0, 40)), 2 * np.pi
-    scene = grimaldi.load({"type": "scene", "disc": {"type": "disk", "bsdf": GREY,
-        "to_world": mi.scalar_rgb.ScalarTransform4f().scale([6, 6, 1])}, "light": emitter(light)})  # fmt: skip
-    source = scene.sources[0]
-    fine = outline(scene, source, sag=[1e-6])
-    coarse = merged(fine, sag)
-    assert len(coarse) < 0.5 * len(fine)
-    assert coarse.sag == fine.sag + sag
-    points = line((-8, 1, -30), (8, 2, -30), 33)
-    receivers = Receivers(mi.Point3d(*points.T.copy()), mi.Vector3f(0), mi.Bool(True))
-
-    def factors(outline: Any) -> Any:
-        m = boundary(scene, source, outline, k, Options(tolerance=1e-5, occlusion="none"))(receivers)
-        return np.array(m.real) + 1j * np.array(m.imag)
-
-    d = np.linalg.norm(points[:, :2], axis=1) + 6
-    slope = float((d * (1 / 40 + 1 / 30)).max())
-    change = np.abs(factors(coarse) - factors(fine)).max()
-    assert 1e-5 < change <= k * slope * sag
 
 
 def test_an_instance_in_a_ready_scene_is_refused_in_one_line():
