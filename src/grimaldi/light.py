@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from hashlib import blake2b
 from itertools import zip_longest
 from typing import Any, NamedTuple
@@ -19,7 +19,7 @@ from grimaldi.conventions import Wavelength, parse_wavelengths
 from grimaldi.diffraction import model
 from grimaldi.diffraction.boundary import boundary
 from grimaldi.diffraction.frame import toward
-from grimaldi.diffraction.model import Evaluate, Factor, Options, Receivers
+from grimaldi.diffraction.model import Blocks, Evaluate, Factor, Options, Receivers, among
 from grimaldi.diffraction.none import none
 from grimaldi.engine.hits import Hits, hits
 from grimaldi.errors import InputError
@@ -90,20 +90,34 @@ class Light:
                 raise InputError(f"wave: groups names {name!r}; the scene has {', '.join(dict.fromkeys(present))}")
         return [present.index(name) for name in names]
 
+    def among(self, blocks: Blocks) -> Light:
+        """The same light, quicker at receivers that lie in these blocks."""
+        return replace(self, beams=tuple(beam._replace(factor=among(beam.factor, blocks)) for beam in self.beams))
+
     def reflected(
-        self, ray: Any, si: Any, bsdf: Any, n: Any, active: Any, known: Sequence[tuple[Factor, Any]] = ()
+        self,
+        ray: Any,
+        si: Any,
+        bsdf: Any,
+        n: Any,
+        active: Any,
+        known: Sequence[tuple[Factor, Any]] = (),
+        block: Callable[[Receivers], Any] | None = None,
     ) -> Reflected:
         """Eq. 3a where rays met surfaces: radiance back along them, and U of each key.
 
-        known: M of each beam, and where it holds; elsewhere it is asked of the model.
+        known: M of each beam, and where it holds; elsewhere it is asked of the model. block: which of the blocks of `among`
+        each lies in.
         """
         p = self.hits.point(ray, si, active)
+        receivers = Receivers(p, n, active)
+        if block is not None:
+            receivers = receivers._replace(block=block(receivers))
         context = mi.BSDFContext()
         zero = type(p.x)(0)
         real, imag, error = ([zero] * len(self.keys) for _ in range(3))
         amplitudes = [(mi.UnpolarizedSpectrum(0), mi.UnpolarizedSpectrum(0)) for _ in self.keys]
         for beam, found in zip_longest(self.beams, known):
-            receivers = Receivers(p, n, active)
             m = beam.factor(receivers) if found is None else _unless(found[0], found[1], beam, receivers)
             u = beam.times(receivers, m)
             wo = si.to_local(toward(beam.source, si.p))
@@ -127,7 +141,7 @@ def _unless(m: Factor, holds: Any, beam: Beam, receivers: Receivers) -> Factor:
     real, imag, error = F(m.real), F(m.imag), F(m.error)
     asked = receivers.active & ~holds
     if asked:
-        own = beam.factor(Receivers(receivers.p, receivers.n, asked))
+        own = beam.factor(receivers._replace(active=asked))
         real, imag, error = F(own.real), F(own.imag), F(own.error)
     return Factor(real, imag, error)
 

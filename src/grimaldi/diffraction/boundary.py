@@ -7,6 +7,7 @@ wave is `segment.segment_wave`, the sums over outlines are in `edges`.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any, NamedTuple
 
 import drjit as dr
@@ -16,11 +17,12 @@ import numpy as np
 from grimaldi.diffraction import none
 from grimaldi.diffraction.arrays import Types, types
 from grimaldi.diffraction.curves import curve_error
-from grimaldi.diffraction.edges import Margins, Sum, body_sum, lit_share, planar_sum
+from grimaldi.diffraction.edges import Everywhere, Margins, Sum, body_sum, lit_share, planar_sum
 from grimaldi.diffraction.frame import Frame, frame
 from grimaldi.diffraction.grazing import chords, near
-from grimaldi.diffraction.model import Evaluate, Factor, Options, Receivers
-from grimaldi.diffraction.occlusion import rays
+from grimaldi.diffraction.lists import Listed, Lists, listed_sum, lists
+from grimaldi.diffraction.model import OUTSIDE, Blocks, Evaluate, Factor, Grouped, Options, Receivers, among
+from grimaldi.diffraction.occlusion import Rays, rays
 from grimaldi.diffraction.screen import beyond
 from grimaldi.diffraction.segment import Rule
 from grimaldi.diffraction.table import Table, coarseness, needs_double, table
@@ -68,19 +70,37 @@ def boundary(scene: Scene, source: Source, outline: Outline, k: float, options: 
     double = of_kind(problem, types(double=True))
     if needs_double(outline, k, options):
         return double
-    single = of_kind(problem, types(double=False))
-    return lambda receivers: _in_either(single, double, options.tolerance, receivers)
+    return _Either(of_kind(problem, types(double=False)), double, options.tolerance)
+
+
+class _Either(NamedTuple):
+    """Float32 first, and Float64 where that is not within the tolerance."""
+
+    single: Evaluate
+    double: Evaluate
+    tolerance: float
+
+    def __call__(self, receivers: Receivers) -> Factor:
+        return _in_either(self.single, self.double, self.tolerance, receivers)
+
+    def among(self, blocks: Blocks) -> Evaluate:
+        """By the same lists in both."""
+        if not (isinstance(self.single, _Bodies) and isinstance(self.double, _Bodies)):
+            return self
+        found = self.single.lists(blocks)
+        return self if found is None else self._replace(
+            single=partial(_listed, self.single, found), double=partial(_listed, self.double, found)
+        )
 
 
 @dr.syntax
 def _in_either(single: Evaluate, double: Evaluate, tolerance: float, receivers: Receivers) -> Factor:
-    """Float32 first, and Float64 where that is not within the tolerance."""
     F = types(double=True).Float
     m = single(receivers)
     real, imag, error, clearance = F(m.real), F(m.imag), F(m.error), F(m.clearance)
     again = receivers.active & (error > tolerance)
     if again:
-        finer = double(Receivers(receivers.p, receivers.n, again))
+        finer = double(receivers._replace(active=again))
         real, imag, error = F(finer.real), F(finer.imag), F(finer.error)
     return Factor(real, imag, error, clearance)
 
@@ -151,35 +171,85 @@ def unoccluded(problem: Problem, precision: Types, far: Any) -> Callable[[Any], 
     def evaluate(p: Any) -> tuple[Any, Any]:
         receivers = Receivers(p, dr.zeros(mi.Vector3f, dr.width(p)), dr.mask_t(p.x)(True))
         fr = frame(problem.source, p, tab)
-        sums, _, _ = body_sum(fr, tab, tab.device(problem.k), rule, 0.0, None, None, False, receivers)
+        sums, _, _ = body_sum(fr, tab, Everywhere(tab), tab.device(problem.k), rule, 0.0, 1.0, None, None, False, receivers)
         return sums.real / (2 * np.pi), sums.imag / (2 * np.pi)
 
     return evaluate
 
 
-def _bodies(problem: Problem, precision: Types) -> Evaluate:
-    scene, source, outline, k, options, grazed = problem
-    rule = problem.rule()
-    probe = rays(scene, source, outline.sag)
-    tolerance = options.tolerance
-    tab = table(outline, source, precision, coarse=coarseness(tolerance), angle=AS_ONE * tolerance)
-    n_pieces = int(tab.n_pieces[0])
-    grazing = None if grazed is None else chords(grazed, tab.centre, precision)
+def _bodies(problem: Problem, precision: Types) -> Grouped:
+    return _Bodies(problem, precision)
 
-    def evaluate(receivers: Receivers) -> Factor:
+
+class _Bodies:
+    """Past bodies: of all pieces, or of those on the lists of the receivers' blocks."""
+
+    def __init__(self, problem: Problem, precision: Types) -> None:
+        scene, source, outline, k, options, grazed = problem
+        tolerance = options.tolerance
+        self.problem = problem
+        self.rule = problem.rule()
+        self.rays = rays(scene, source, outline.sag)
+        self.tab = table(outline, source, precision, coarse=coarseness(tolerance), angle=AS_ONE * tolerance)
+        self.share = UNASKED * tolerance / int(self.tab.n_pieces[0])
+        self.grazing = None if grazed is None else chords(grazed, self.tab.centre, precision)
+
+    def __call__(self, receivers: Receivers, found: Lists | None = None) -> Factor:
+        _, source, _, k, options, _ = self.problem
+        tab, rule = self.tab, self.rule
         fr = frame(source, receivers.p, tab)
-        sums, nearest, margins = body_sum(
+        if found is not None:
+            beside = found.near(receivers, self.grazing)
+        else:
+            beside = None if self.grazing is None else near(fr, self.grazing, tab.device(k), receivers)
+        sums = body_sum(
             fr,
             tab,
+            Everywhere(tab) if found is None else Listed(found.tested),
             tab.device(k),
             rule,
-            UNASKED * tolerance / n_pieces,
-            probe if options.occlusion != "none" else None,
-            None if grazing is None else near(fr, grazing, tab.device(k), receivers),
+            self.share if found is None else 0.0,
+            options.tolerance,
+            self.probe,
+            beside,
             options.rim == "smooth",
             receivers,
         )
-        lit = lit_share(fr, tab, nearest, probe, receivers)
+        if found is not None:
+            sums = listed_sum(fr, tab, found, tab.device(k), rule, sums, receivers)
+        sums, nearest, margins = sums
+        lit = lit_share(fr, tab, nearest, self.rays, receivers)
         return _factor(tab, rule, fr, k, margins, lit, 1, sums)
 
-    return evaluate
+    @property
+    def probe(self) -> Rays | None:
+        """What blocks X→P."""
+        return self.rays if self.problem.options.occlusion != "none" else None
+
+    def among(self, blocks: Blocks) -> Evaluate:
+        """By lists of what acts on the blocks; receivers that lie in none ask all pieces."""
+        found = self.lists(blocks)
+        return self if found is None else partial(_listed, self, found)
+
+    def lists(self, blocks: Blocks) -> Lists | None:
+        """What acts on each block; None where ends of runs are not enough."""
+        _, source, _, k, options, _ = self.problem
+        tab, corners = self.tab, self.rule.corners
+        if corners is None or options.rim == "smooth":
+            return None
+        k = tab.device(k)
+        return lists(source, tab, k, corners, options.tolerance, self.share, self.probe, self.grazing, blocks)
+
+
+@dr.syntax
+def _listed(bodies: _Bodies, found: Lists, receivers: Receivers) -> Factor:
+    """By the lists of blocks, and by all pieces where receivers lie in no block."""
+    F = bodies.tab.types.Float
+    listed = receivers.active & (receivers.block != OUTSIDE)
+    m = bodies(receivers._replace(active=listed), found)
+    real, imag, error, clearance = F(m.real), F(m.imag), F(m.error), F(m.clearance)
+    other = receivers.active & ~listed
+    if other:
+        own = bodies(receivers._replace(active=other))
+        real, imag, error, clearance = F(own.real), F(own.imag), F(own.error), F(own.clearance)
+    return Factor(real, imag, error, clearance)

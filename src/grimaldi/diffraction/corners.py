@@ -62,14 +62,29 @@ def corner(frame: Frame, X: Any, k: Any) -> Corner:
     return Corner(q, h, d2, along, inv, C, cos, sin, dr.select(between, d2, dr.inf), dr.fma(z2, z2, d2))
 
 
+class Slopes(NamedTuple):
+    """A segment between two corners: its length², d² φ', and ψ' where it begins and ends, times the length."""
+
+    length2: Any
+    turn: Any
+    a: Any
+    b: Any
+
+
+def slopes(ray: Any, a: Corner, b: Corner, k: Any) -> Slopes:
+    """How φ and ψ = kΔ grow from corner a to b, about a ray of that direction."""
+    d, h = b.q - a.q, b.h - a.h
+    return Slopes(
+        dr.fma(h, h, dr.squared_norm(d)),
+        dr.dot(ray, dr.cross(a.q, d)),
+        k * dr.fma(h, a.along, dr.dot(a.q, d) * a.inv),
+        k * dr.fma(h, b.along, dr.dot(b.q, d) * b.inv),
+    )
+
+
 def between(ray: Any, a: Corner, b: Corner, k: Any, rule: Corners) -> Ends:
     """∫ C e^{ikΔ} dφ from corner a to b, about a ray of that direction."""
-    d, h = b.q - a.q, b.h - a.h
-    length2 = dr.fma(h, h, dr.squared_norm(d))
-    turn = dr.dot(ray, dr.cross(a.q, d))
-    # ψ' at the corners, times the length
-    slope_a = k * dr.fma(h, a.along, dr.dot(a.q, d) * a.inv)
-    slope_b = k * dr.fma(h, b.along, dr.dot(b.q, d) * b.inv)
+    length2, turn, slope_a, slope_b = slopes(ray, a, b, k)
     bend = slope_b - slope_a
 
     # short: Δφ = atan(turn / a·b), shared out so that dφ/dt is in the ratio of 1/d²
@@ -99,6 +114,16 @@ def between(ray: Any, a: Corner, b: Corner, k: Any, rule: Corners) -> Ends:
         is_short | is_far,
         turn,
     )
+
+
+def leading(ray: Any, at: Corner, e: Any, k: Any) -> tuple[Any, Any]:
+    """i C φ'/ψ' e^{iψ} at a corner of a line along e: what a far run sends from where it begins, less the same there
+    where it stops."""
+    h = dr.dot(e, ray)
+    d = e - h * ray
+    slope = k * dr.fma(h, at.along, dr.dot(at.q, d) * at.inv)
+    size = dr.dot(ray, dr.cross(at.q, d)) * at.C / (at.d2 * slope)
+    return -size * at.sin, size * at.cos
 
 
 def _filon(delta: Any, cos: Any, sin: Any) -> tuple[Any, Any]:

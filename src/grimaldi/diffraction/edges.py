@@ -5,7 +5,7 @@ The sum and n take the side of an edge from the same κ, so that M runs smoothly
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import drjit as dr
 import mitsuba as mi
@@ -15,7 +15,7 @@ from grimaldi.diffraction.arrays import on_device
 from grimaldi.diffraction.corners import Corner, between, corner
 from grimaldi.diffraction.creeping import damped
 from grimaldi.diffraction.frame import Frame, constant
-from grimaldi.diffraction.grazing import FAINT, Near, grazed, other_than
+from grimaldi.diffraction.grazing import Near, grazed, other_than, worth
 from grimaldi.diffraction.hierarchy import NONE, least_detour
 from grimaldi.diffraction.model import Receivers
 from grimaldi.diffraction.occlusion import Rays
@@ -41,7 +41,6 @@ class Nearest(NamedTuple):
 
     distance2: Any
     segment: Any
-    piece: Any
 
 
 class Margins(NamedTuple):
@@ -203,7 +202,7 @@ def sounds(fr: Frame, piece: Piece, n: Any) -> Any:
     return above & behind
 
 
-def _cut_off(fr: Frame, piece: Piece, k: Any) -> Any:
+def cut_off(fr: Frame, piece: Piece, k: Any) -> Any:
     """|M| that the chain's wave, cut off somewhere on this piece, would at most leave.
 
     The end of a chain sends |M| = √D / (4π (D + w) √w), D = kΔs at the stationary point, w = k(Δ - Δs).
@@ -214,24 +213,53 @@ def _cut_off(fr: Frame, piece: Piece, k: Any) -> Any:
     return dr.sqrt(D) / (4 * np.pi * (D + w) * dr.sqrt(w))
 
 
-def visit(fr: Frame, tab: Table, i: Any) -> tuple[Any, Any, Any]:
-    """The piece or run that a node of the table's tree stands for, whether to take it, and whether to go into the node.
+class Walk(Protocol):
+    """The pieces that receivers ask, one after the other."""
 
-    A run is taken as one where it subtends a small angle about the ray.
-    """
-    centre, radius = tab.tree.node(i)
-    inside = least_detour(fr, centre, radius) <= tab.far
-    item = tab.tree.item_of(i)
-    x = centre - fr.foot
-    d2 = dr.squared_norm(x) - dr.square(dr.dot(x, fr.a))
-    whole = (item < tab.n_pieces) | ((item != NONE) & (dr.square(radius) < dr.square(tab.angle) * d2))
-    return item, inside & whole, inside & ~whole
+    def bounds(self, receivers: Receivers) -> tuple[Any, Any]:
+        """Where to begin, and where to stop."""
+        ...
+
+    def visit(self, fr: Frame, i: Any) -> tuple[Any, Any, Any]:
+        """The piece at a place, whether to take it, and whether to go into what the place stands for."""
+        ...
+
+    def after(self, i: Any, inside: Any) -> Any:
+        """The next place."""
+        ...
+
+    def weight(self, fr: Frame, piece: Piece) -> Any:
+        """What a piece's wave counts."""
+        ...
 
 
-def _taper(fr: Frame, tab: Table, piece: Piece) -> Any:
-    """1 near the ray, going smoothly to 0 where Δ is `far`: a sharp end would send a wave of its own."""
-    t = dr.clip(2 - 2 * dr.maximum(least_detour(fr, piece.middle, 0), 0) / tab.far, 0, 1)
-    return t * t * (3 - 2 * t)
+class Everywhere(NamedTuple):
+    """All pieces that are near enough to matter, by the table's hierarchy."""
+
+    table: Table
+
+    def bounds(self, receivers: Receivers) -> tuple[Any, Any]:  # noqa: ARG002
+        U = dr.uint32_array_t(self.table.types.Float)
+        return U(0), self.table.tree.size
+
+    def visit(self, fr: Frame, i: Any) -> tuple[Any, Any, Any]:
+        """A run is taken as one where it subtends a small angle about the ray."""
+        tab = self.table
+        centre, radius = tab.tree.node(i)
+        inside = least_detour(fr, centre, radius) <= tab.far
+        item = tab.tree.item_of(i)
+        x = centre - fr.foot
+        d2 = dr.squared_norm(x) - dr.square(dr.dot(x, fr.a))
+        whole = (item < tab.n_pieces) | ((item != NONE) & (dr.square(radius) < dr.square(tab.angle) * d2))
+        return item, inside & whole, inside & ~whole
+
+    def after(self, i: Any, inside: Any) -> Any:
+        return self.table.tree.after(i, inside)
+
+    def weight(self, fr: Frame, piece: Piece) -> Any:
+        """1 near the ray, going smoothly to 0 where Δ is `far`: a sharp end would send a wave of its own."""
+        t = dr.clip(2 - 2 * dr.maximum(least_detour(fr, piece.middle, 0), 0) / self.table.far, 0, 1)
+        return t * t * (3 - 2 * t)
 
 
 def closest(fr: Frame, seg: Segment, ln: Line) -> Any:
@@ -248,17 +276,19 @@ def closest(fr: Frame, seg: Segment, ln: Line) -> Any:
 def body_sum(
     fr: Frame,
     tab: Table,
+    walk: Walk,
     k: Any,
     rule: Rule,
     share: float,
+    tolerance: float,
     probe: Rays | None,
     beside: Near | None,
     smooth: bool,
     receivers: Receivers,
 ) -> tuple[Sum, Nearest, Margins]:
-    """The sum over the outlines of bodies, piece by piece, each as far as it reaches the receiver.
+    """The sum over the outlines of bodies, piece by piece of a walk, each as far as it reaches the receiver.
 
-    What would add less than `share` of M goes unasked; without a probe all does. Without silhouettes
+    What would add less than `share` of M goes unasked, nothing if that is 0; without a probe all does. Without silhouettes
     near by a piece reaches the receiver or does not. `smooth` rims are those with a radius.
     """
     F = tab.types.Float
@@ -269,11 +299,11 @@ def body_sum(
         assert probe is not None
         p = p + probe.epsilon(p) * receivers.n  # off its own surface
     real, imag, err_real, err_imag = F(0), F(0), F(0), F(0)
-    nearest2, nearest_segment, nearest_piece = F(dr.inf), U(0), U(0)
+    nearest2, nearest_segment = F(dr.inf), U(0)
     receiver2, rounding2, unasked = F(dr.inf), F(0), F(0)
-    i = U(0)
-    while receivers.active & (i < tab.tree.size):
-        item, taken, inside = visit(fr, tab, i)
+    i, end = walk.bounds(receivers)
+    while receivers.active & (i < end):
+        item, taken, inside = walk.visit(fr, i)
         if receivers.active & taken:
             piece = tab.piece(item)
             acts = sounds(fr, piece, n)
@@ -281,22 +311,26 @@ def body_sum(
             past_real, past_imag = F(0), F(0)
             if dr.hint(probe is not None, mode="scalar"):
                 assert probe is not None
-                left = _cut_off(fr, piece, k)
-                tested = acts & (left > share)
-                unasked += dr.select(acts & ~tested, left, 0)
+                tested = dr.mask_t(F)(acts)
+                if dr.hint(share > 0, mode="scalar"):
+                    left = cut_off(fr, piece, k)
+                    tested = acts & (left > share)
+                    unasked += dr.select(acts & ~tested, left, 0)
                 if tested:
                     x = mi.Point3f(piece.middle + constant(tab.types.Vector, tab.centre))
                     visible = acts & probe.reaches(x, piece, p, tested)
                 if dr.hint(beside is not None, mode="scalar"):
                     assert beside is not None
-                    body, close = other_than(beside, piece)
-                    close &= tested & (left > FAINT)
+                    body, v2, close = other_than(beside, piece)
+                    close &= tested
+                    if close:
+                        close &= worth(cut_off(fr, piece, k), v2, tolerance)
                     if close:
                         past_real, past_imag = grazed(fr, beside.silhouettes, piece, body, visible, k, close)
                 acts = visible | (past_real != 0) | (past_imag != 0)
             passed = Passed(visible, past_real, past_imag) if beside is not None else None
             chain = chain_wave(fr, tab, piece.first, piece.end, k, rule, passed, smooth, acts)
-            weight = _taper(fr, tab, piece)
+            weight = walk.weight(fr, piece)
             real, imag = dr.fma(weight, chain.wave.real, real), dr.fma(weight, chain.wave.imag, imag)
             err_real, err_imag = err_real + chain.wave.err_real, err_imag + chain.wave.err_imag
             rounding2 += chain.wave.rounding2
@@ -304,9 +338,8 @@ def body_sum(
             closer = visible & (chain.distance2 < nearest2)
             nearest2 = dr.select(closer, chain.distance2, nearest2)
             nearest_segment = dr.select(closer, chain.segment, nearest_segment)
-            nearest_piece = dr.select(closer, item, nearest_piece)
-        i = tab.tree.after(i, inside)
-    nearest = Nearest(nearest2, nearest_segment, nearest_piece)
+        i = walk.after(i, inside)
+    nearest = Nearest(nearest2, nearest_segment)
     return Sum(real, imag, err_real, err_imag, rounding2, unasked), nearest, Margins(nearest2, receiver2)
 
 
@@ -320,9 +353,10 @@ def _crossings(fr: Frame, tab: Table, bend: Any, n: Any, active: Any) -> Any:
     q = x - along * fr.a
     height = dr.norm(q)
     across = dr.cross(fr.a, q / height)
+    walk = Everywhere(tab)
     count, i = F(0), U(0)
     while active & (i < tab.tree.size):
-        item, taken, inside = visit(fr, tab, i)
+        item, taken, inside = walk.visit(fr, i)
         if active & taken:
             piece = tab.piece(item)
             acts = sounds(fr, piece, n)
@@ -340,7 +374,7 @@ def _crossings(fr: Frame, tab: Table, bend: Any, n: Any, active: Any) -> Any:
                     top = dr.minimum(top, (fr.z1 + z) / (fr.z1 + along))
                 count += dr.select(out < height * dr.minimum(top, 1), turn, 0)
                 j += 1
-        i = tab.tree.after(i, inside)
+        i = walk.after(i, inside)
     return count
 
 
@@ -361,7 +395,7 @@ def lit_share(fr: Frame, tab: Table, nearest: Nearest, probe: Rays, receivers: R
     near = receivers.active & (nearest.distance2 < rim * rim)
     if near:
         seg = tab.segment(nearest.segment)
-        piece = tab.piece(nearest.piece)
+        piece = tab.piece(tab.piece_at(nearest.segment))
         ln = line(fr, seg.X0, seg.e)
         bend = seg.X0 + dr.clip(ln.td, 0, seg.length) * seg.e + 3 * rim * piece.outward
         x = mi.Point3f(bend + constant(V, tab.centre))

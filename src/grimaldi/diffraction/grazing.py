@@ -32,7 +32,8 @@ from grimaldi.scene.model import Vector
 
 FEW = 64  # chords, that take no hierarchy
 FAINT = 0.01  # |M| of a wave that is not worth a second edge
-WIDEST = 1 / (np.sqrt(2) * np.pi * FAINT)  # Fresnel parameter beyond which E is fainter
+FAINTER = 0.03  # of the tolerance: likewise, at loose ones
+WIDEST = 1 / (2**0.5 * np.pi * FAINT)  # Fresnel parameter beyond which E is fainter
 
 
 class Chord(NamedTuple):
@@ -46,10 +47,9 @@ class Chord(NamedTuple):
 
 
 class Chords(NamedTuple):
-    """Whole silhouettes as flat device buffers, body after body, about the centre of the outlines' table."""
+    """Whole silhouettes as flat device buffers, about the centre of the outlines' table."""
 
     records: Any
-    ranges: Any  # first chord of each body, and their number
     tree: Tree
     types: Types
 
@@ -77,6 +77,11 @@ class Near(NamedTuple):
     next_body: Any
     next_v2: Any
 
+    def of(self, i: Any, active: Any, silhouettes: Chords) -> Near:
+        """Those of some receivers, by their indices, in the precision of `silhouettes`."""
+        F = silhouettes.types.Float
+        return Near(silhouettes, *(F(dr.gather(type(v), v, i, active)) for v in self[1:]))
+
 
 def chords(outline: Outline, centre: Vector, types: Types) -> Chords | None:
     """Whole silhouettes, packed; None where no other body's is there to be grazed."""
@@ -85,27 +90,25 @@ def chords(outline: Outline, centre: Vector, types: Types) -> Chords | None:
     ranges = cut(outline)
     first, last = ranges[:-1], ranges[1:] - 1
     of = outline.body[first]
-    order = np.argsort(of, kind="stable")
     start, end = outline.start[first] - centre, outline.end[last] - centre
     length = np.maximum(np.linalg.norm(end - start, axis=1, keepdims=True), 1e-300)
     zero = np.zeros_like(length)
     outward = outline.outward[(first + last) // 2]
-    records = np.concatenate([start, of[:, None], (end - start) / length, length, outward, zero], axis=1)[order]
-    begin = np.searchsorted(of[order], np.arange(of.max() + 2))
-    index = dr.uint32_array_t(types.Float)
-    middle, half = (0.5 * (start + end))[order], 0.5 * length[order, 0]
-    plan = flat(middle, half) if len(of) < FEW else layout(middle, half, of[order])
+    records = np.concatenate([start, of[:, None], (end - start) / length, length, outward, zero], axis=1)
+    middle, half = 0.5 * (start + end), 0.5 * length[:, 0]
+    plan = flat(middle, half) if len(of) < FEW else layout(middle, half, of)
     item = np.where(plan.end == plan.begin + 1, plan.order[plan.begin], NONE)
-    return Chords(types.buffer(records), index(begin.astype(np.uint32)), plan.tree(item, types), types)
+    return Chords(types.buffer(records), plan.tree(item, types), types)
 
 
-def passing(way: Frame, chord: Chord, k: float) -> Passing:
-    """v² = (2/λ) d² (1/z1 + 1/z2), d the least distance of a way from a chord."""
+def passing(way: Frame, chord: Chord, k: float, room: Any = 0) -> Passing:
+    """v² = (2/λ) d² (1/z1 + 1/z2), d the least distance of a way from a chord, less `room`."""
     ln = line(way, chord.start, chord.e)
     t = dr.clip(ln.td, 0, chord.length)
     along = ln.h + t * ln.ea
     d2 = ln.eqq * (dr.square(t - ln.td) + ln.w * ln.w)
     z2 = way.z2 - along
+    d2 = dr.square(dr.maximum(dr.sqrt(d2) - room, 0))
     between = z2 > 0
     curvature = dr.rcp(z2)
     if not way.plane:
@@ -116,8 +119,11 @@ def passing(way: Frame, chord: Chord, k: float) -> Passing:
 
 
 @dr.syntax
-def near(fr: Frame, silhouettes: Chords, k: float, receivers: Receivers) -> Near:
-    """The bodies worth a look at each receiver; on a surface, only what rises above its horizon."""
+def near(fr: Frame, silhouettes: Chords, k: float, receivers: Receivers, room: Any = 0) -> Near:
+    """The bodies worth a look at each receiver; on a surface, only what rises above its horizon.
+
+    room: how far other receivers may be, that are asked for with these.
+    """
     F = silhouettes.types.Float
     n = silhouettes.types.Vector(receivers.n)
     p = fr.foot + fr.z2 * fr.a
@@ -126,11 +132,12 @@ def near(fr: Frame, silhouettes: Chords, k: float, receivers: Receivers) -> Near
     far = (0.5 * np.pi * WIDEST * WIDEST) / k  # v² is (2/π) kΔ or less
     i = dr.uint32_array_t(F)(0)
     while receivers.active & (i < silhouettes.tree.size):
-        inside = least_detour(fr, *silhouettes.tree.node(i)) <= far
+        centre, radius = silhouettes.tree.node(i)
+        inside = least_detour(fr, centre, radius + room) <= far
         item = silhouettes.tree.item_of(i)
         if receivers.active & inside & (item != NONE):
             chord = silhouettes.chord(item)
-            at = passing(fr, chord, k)
+            at = passing(fr, chord, k, room)
             x = chord.start + at.t * chord.e - p
             rises = everywhere | (dr.dot(n, x) > 1e-4 * dr.norm(x))
             v2_j = dr.select(rises, at.v2, dr.inf)
@@ -146,11 +153,17 @@ def near(fr: Frame, silhouettes: Chords, k: float, receivers: Receivers) -> Near
     return Near(silhouettes, body, v2, next_body, next_v2)
 
 
-def other_than(found: Near, piece: Piece) -> tuple[Any, Any]:
-    """The nearest body that a piece is no part of, and whether it is near enough to matter."""
+def other_than(found: Near, piece: Piece) -> tuple[Any, Any, Any]:
+    """The nearest body that a piece is no part of, v² there, and whether it is near enough to matter."""
     own = found.body == piece.body
     v2 = dr.select(own, found.next_v2, found.v2)
-    return dr.select(own, found.next_body, found.body), v2 < WIDEST * WIDEST
+    return dr.select(own, found.next_body, found.body), v2, v2 < WIDEST * WIDEST
+
+
+def worth(wave: Any, v2: Any, tolerance: float) -> Any:
+    """Whether what a second edge at Fresnel's parameter v makes of a wave, |M| = |wave| |E(v)|, is worth asking for."""
+    least = max(FAINT * FAINT, FAINTER * tolerance)
+    return (wave > FAINT) & (dr.square(wave) > (2 * np.pi**2 * least * least) * v2)
 
 
 @dr.syntax
@@ -167,16 +180,18 @@ def grazed(
     d = fr.foot + fr.z2 * fr.a - piece.middle
     s = dr.norm(d)
     way = Frame(d / s, piece.middle, F(0), s, s, False)
-    of = U(dr.maximum(body, 0))
-    j = dr.gather(U, silhouettes.ranges, of, active)
-    end = dr.gather(U, silhouettes.ranges, of + 1, active)
-    best, v2 = U(j), F(dr.inf)
-    while active & (j < end):
-        v2_j = passing(way, silhouettes.chord(j), k).v2
-        closer = v2_j < v2
-        best = dr.select(closer, j, best)
-        v2 = dr.select(closer, v2_j, v2)
-        j += 1
+    far = (0.5 * np.pi * WIDEST * WIDEST) / k  # v² is (2/π) kΔ or less
+    i, best, v2 = U(0), U(0), F(dr.inf)
+    while active & (i < silhouettes.tree.size):
+        inside = least_detour(way, *silhouettes.tree.node(i)) <= far
+        item = silhouettes.tree.item_of(i)
+        if active & inside & (item != NONE):
+            here = silhouettes.chord(item)
+            v2_i = passing(way, here, k).v2
+            closer = (here.body == body) & (v2_i < v2)
+            best = dr.select(closer, item, best)
+            v2 = dr.select(closer, v2_i, v2)
+        i = silhouettes.tree.after(i, inside)
     chord = silhouettes.chord(best)
     at = passing(way, chord, k)
     there = chord.start + at.t * chord.e

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple, Protocol, runtime_checkable
+
+import drjit as dr
 
 from grimaldi.outlines.model import Outline
 from grimaldi.scene.model import Scene, Source
@@ -48,6 +50,37 @@ class Receivers(NamedTuple):
     p: Any  # Float64 (3)
     n: Any  # unit normal of the surface the point lies on, towards the side that is asked; 0 in free space
     active: Any
+    block: Any = None  # of `Blocks`, in which each lies; OUTSIDE where it lies in none
+
+
+OUTSIDE = 0xFFFFFFFF
+
+
+class Blocks(NamedTuple):
+    """Groups of receivers side by side, as flat Dr.Jit arrays: what changes slowly is found once for each."""
+
+    p: Any  # Float64 (3): a receiver in the middle
+    n: Any  # as in `Receivers`, there
+    radius: Any  # of the sphere about p that holds the receivers [scene units]
+    bend: Any  # how far their normals differ from n at most; 0 where all lie in the plane through p across n
+    active: Any
+    asked: Any  # whether receivers may lie in it; others only tell what reaches them
+    beside: tuple[Any, ...]  # UInt32: blocks around it on the same surface, itself where none is
+
+    def of(self, receivers: Receivers, block: Any) -> Any:
+        """`block` where receivers lie in it, OUTSIDE elsewhere."""
+        active = receivers.active & (block < dr.width(self.p))
+        active &= dr.gather(type(self.asked), self.asked, block, active)
+        d = receivers.p - dr.gather(type(self.p), self.p, block, active)
+        n = dr.gather(type(self.n), self.n, block, active)
+        F = type(d.x)
+        radius = F(dr.gather(type(self.radius), self.radius, block, active))
+        bend = dr.gather(type(self.bend), self.bend, block, active)
+        inside = active & (dr.squared_norm(d) <= radius * radius)
+        turned = dr.squared_norm(receivers.n - n)
+        in_plane = (turned < 1e-6) & (dr.abs(dr.dot(type(d)(n), d)) <= 1e-3 * radius)
+        inside &= dr.select(bend == 0, in_plane, turned <= bend * bend)
+        return dr.select(inside, block, OUTSIDE)
 
 
 class Factor(NamedTuple):
@@ -63,5 +96,23 @@ class Factor(NamedTuple):
 
 
 Evaluate = Callable[[Receivers], Factor]
+
+
+@runtime_checkable
+class Grouped(Protocol):
+    """An `Evaluate` that can be quicker where it knows which receivers lie side by side."""
+
+    def __call__(self, receivers: Receivers) -> Factor: ...
+
+    def among(self, blocks: Blocks) -> Evaluate:
+        """The same for receivers whose `block` is told."""
+        ...
+
+
 Model = Callable[[Scene, Source, Outline, float, Options], Evaluate]
 """model(scene, source, outline, k, options); a pure function of blocks of points, traceable by Dr.Jit."""
+
+
+def among(evaluate: Evaluate, blocks: Blocks) -> Evaluate:
+    """The same for receivers whose `block` is told, where that helps."""
+    return evaluate.among(blocks) if isinstance(evaluate, Grouped) else evaluate

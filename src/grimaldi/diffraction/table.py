@@ -53,6 +53,8 @@ class Table(NamedTuple):
     segments: Any
     ranges: Any  # first segment and the one after the last, of pieces and then of longer runs
     pieces: Any
+    piece_of: Any  # of each segment
+    follows: Any  # of each piece: whether it begins where the one before it ends
     tree: Tree  # of pieces and runs
     far: Any  # what lies at a larger Δ adds nothing
     angle: Any  # half of what a run of pieces subtends at most about the ray, to reach the receiver or not as one [rad]
@@ -76,6 +78,10 @@ class Table(NamedTuple):
         """First segment of a piece, and the one after its last."""
         index = type(self.ranges)
         return dr.gather(index, self.ranges, 2 * i), dr.gather(index, self.ranges, 2 * i + 1)
+
+    def piece_at(self, segment: Any) -> Any:
+        """The piece that a segment is part of."""
+        return dr.gather(type(self.piece_of), self.piece_of, segment)
 
     def piece(self, i: Any) -> Piece:
         P, V = self.types.Packet, self.types.Vector
@@ -180,6 +186,8 @@ def table(
         types.buffer(segments),
         index(runs.ravel().astype(np.uint32)),
         types.buffer(pieces),
+        index(np.repeat(np.arange(len(ranges) - 1), np.diff(ranges)).astype(np.uint32)),
+        dr.mask_t(types.Float)(np.append(False, outline.chain[ranges[1:-1]] == outline.chain[ranges[1:-1] - 1])),
         plan.tree(item, types),
         on_device(types.Float, min(outline.far, 1e30)),
         on_device(types.Float, angle),

@@ -16,7 +16,8 @@ import mitsuba
 import numpy as np
 from numpy.typing import NDArray
 
-from grimaldi.diffraction.model import Factor, Receivers
+from grimaldi.diffraction.model import OUTSIDE, Factor, Receivers
+from grimaldi.engine.blocks import Sight, Squares, squares
 from grimaldi.engine.cells import LARGEST, Cells, Nodes, cells
 from grimaldi.light import Beam, Light, Reflected
 from grimaldi.tracing import trace
@@ -77,12 +78,14 @@ class Band:
     top: int
     rows: int
     cells: tuple[Cells, ...]
+    light: Light  # that knows what acts on the blocks of the film
+    squares: Squares | None
 
 
 def bands(light: Light, sensor: Any, shot: Shot) -> Iterator[Band]:
     """The film from its top on, as many rows at once as memory allows."""
     if light.interpolated == 0 or sensor.needs_aperture_sample():
-        yield Band(0, shot.height, ())
+        yield Band(0, shot.height, (), light, None)
         return
     finest = (
         1 if shot.spp >= 8 else 2 if shot.spp >= 2 else 4
@@ -91,8 +94,11 @@ def bands(light: Light, sensor: Any, shot: Shot) -> Iterator[Band]:
     step = LARGEST * max(int(NODES / row), 1)
     for top in range(0, shot.height, step):
         rows = min(step, shot.height - top)
-        nodes = (partial(_nodes, light, beam, sensor, shot) for beam in light.beams)
-        yield Band(top, rows, tuple(cells(ask, shot.width, top, rows, finest, light.interpolated) for ask in nodes))
+        film = squares(lambda x, y: _sight(light, sensor, shot, x, y)[0], shot.width, top, rows)
+        known = light.among(film.blocks)
+        nodes = (partial(_nodes, known, beam, sensor, shot, film) for beam in known.beams)
+        found = tuple(cells(ask, shot.width, top, rows, finest, light.interpolated) for ask in nodes)
+        yield Band(top, rows, found, known, film)
 
 
 def tiles(light: Light, shot: Shot, band: Band) -> Iterator[tuple[int, int]]:
@@ -105,19 +111,31 @@ def tiles(light: Light, shot: Shot, band: Band) -> Iterator[tuple[int, int]]:
         yield first + begin, min(step, pixels - begin)
 
 
-def _nodes(light: Light, beam: Beam, sensor: Any, shot: Shot, x: Any, y: Any) -> Nodes:
-    """M of a beam at what the camera sees at places of the film [pixels]."""
+def _sight(light: Light, sensor: Any, shot: Shot, x: Any, y: Any) -> tuple[Sight, Any]:
+    """What the camera sees at places of the film [pixels], and Mitsuba's interactions."""
     place = mi.Point2f(x, y) / mi.Point2f(dr.opaque(mi.Float, shot.width), dr.opaque(mi.Float, shot.height))
     ray, _ = sensor.sample_ray_differential(sensor.shutter_open(), 0.5, place, mi.Point2f(0.5))
     si = light.scene.mitsuba.ray_intersect(ray)
     lit = si.is_valid() & mi.has_flag(si.bsdf(ray).flags(), mi.BSDFFlags.Smooth)
     n = mi.Vector3f(dr.mulsign(si.n, -dr.dot(si.n, ray.d)))
-    m = beam.factor(Receivers(light.hits.point(ray, si, lit), n, lit))
+    shape = dr.select(lit, dr.reinterpret_array(mi.UInt32, si.shape), 0)
+    return Sight(ray, Receivers(light.hits.point(ray, si, lit), n, lit), shape), si
+
+
+def _nodes(light: Light, beam: Beam, sensor: Any, shot: Shot, film: Squares, x: Any, y: Any) -> Nodes:
+    """M of a beam at what the camera sees at places of the film [pixels]."""
+    (ray, receivers, shape), si = _sight(light, sensor, shot, x, y)
+    m = beam.factor(receivers._replace(block=film.at(x, y, receivers)))
+    n = receivers.n
     pixel = mi.Float(0)
     for o, d in ((ray.o_x, ray.d_x), (ray.o_y, ray.d_y)):
         pixel = dr.maximum(pixel, dr.norm(o + d * (dr.dot(n, si.p - o) / dr.dot(n, d)) - si.p))
-    shape = dr.select(lit, dr.reinterpret_array(mi.UInt32, si.shape), 0)
     return Nodes(mi.Float(m.real), mi.Float(m.imag), mi.Float(m.error), si.t, shape, mi.Float(m.clearance) / pixel)
+
+
+def _block(film: Squares, place: Any, first: Any, receivers: Receivers) -> Any:
+    """The blocks of receivers at places of the film, of those that the camera itself sees."""
+    return dr.select(first, film.at(place.x, place.y, receivers), OUTSIDE)
 
 
 def render_tile(light: Light, sensor: Any, shot: Shot, first: int, pixels: int, band: Band | None = None) -> Tile:
@@ -144,7 +162,10 @@ def render_tile(light: Light, sensor: Any, shot: Shot, first: int, pixels: int, 
             shape: Any = dr.reinterpret_array(mi.UInt32, si.shape)
             found = m.at(film.x, film.y, si.t, shape, active & first)
             known.append((Factor(found.real, found.imag, found.error), found.holds))
-        return light.reflected(ray, si, bsdf, n, active, known)
+        if band is None or band.squares is None:
+            return light.reflected(ray, si, bsdf, n, active, known)
+        block = partial(_block, band.squares, film, first)
+        return band.light.reflected(ray, si, bsdf, n, active, known, block)
 
     path = trace(
         scene,
