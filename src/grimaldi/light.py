@@ -102,17 +102,17 @@ class Light:
         n: Any,
         active: Any,
         known: Sequence[tuple[Factor, Any]] = (),
-        block: Callable[[Receivers], Any] | None = None,
+        placed: Callable[[Receivers], Receivers] | None = None,
     ) -> Reflected:
         """Eq. 3a where rays met surfaces: radiance back along them, and U of each key.
 
-        known: M of each beam, and where it holds; elsewhere it is asked of the model. block: which of the blocks of `among`
-        each lies in.
+        known: M of each beam, and where it holds; elsewhere it is asked of the model. placed: adds the blocks of `among` that
+        receivers lie in.
         """
         p = self.hits.point(ray, si, active)
         receivers = Receivers(p, n, active)
-        if block is not None:
-            receivers = receivers._replace(block=block(receivers))
+        if placed is not None:
+            receivers = placed(receivers)
         context = mi.BSDFContext()
         zero = type(p.x)(0)
         real, imag, error = ([zero] * len(self.keys) for _ in range(3))

@@ -205,7 +205,7 @@ class _Bodies:
         sums = body_sum(
             fr,
             tab,
-            Everywhere(tab) if found is None else Listed(found.tested),
+            Everywhere(tab) if found is None else Listed(found, receivers.cell),
             tab.device(k),
             rule,
             self.share if found is None else 0.0,

@@ -224,6 +224,10 @@ class Walk(Protocol):
         """The piece at a place, whether to take it, and whether to go into what the place stands for."""
         ...
 
+    def asks(self, i: Any) -> Any:
+        """Whether it is not known that the piece reaches the receiver."""
+        ...
+
     def after(self, i: Any, inside: Any) -> Any:
         """The next place."""
         ...
@@ -252,6 +256,9 @@ class Everywhere(NamedTuple):
         d2 = dr.squared_norm(x) - dr.square(dr.dot(x, fr.a))
         whole = (item < tab.n_pieces) | ((item != NONE) & (dr.square(radius) < dr.square(tab.angle) * d2))
         return item, inside & whole, inside & ~whole
+
+    def asks(self, i: Any) -> Any:  # noqa: ARG002
+        return dr.mask_t(self.table.types.Float)(True)
 
     def after(self, i: Any, inside: Any) -> Any:
         return self.table.tree.after(i, inside)
@@ -311,10 +318,10 @@ def body_sum(
             past_real, past_imag = F(0), F(0)
             if dr.hint(probe is not None, mode="scalar"):
                 assert probe is not None
-                tested = dr.mask_t(F)(acts)
+                tested = acts & walk.asks(i)
                 if dr.hint(share > 0, mode="scalar"):
                     left = cut_off(fr, piece, k)
-                    tested = acts & (left > share)
+                    tested &= left > share
                     unasked += dr.select(acts & ~tested, left, 0)
                 if tested:
                     x = mi.Point3f(piece.middle + constant(tab.types.Vector, tab.centre))

@@ -18,7 +18,7 @@ from grimaldi.diffraction.edges import Margins, Nearest, Sum, chain_wave, cut_of
 from grimaldi.diffraction.frame import Frame, constant, frame
 from grimaldi.diffraction.grazing import Chords, Near, near, other_than, worth
 from grimaldi.diffraction.hierarchy import least_detour
-from grimaldi.diffraction.model import Blocks, Receivers
+from grimaldi.diffraction.model import ACROSS, Blocks, Receivers
 from grimaldi.diffraction.occlusion import Rays
 from grimaldi.diffraction.segment import Corners, Rule
 from grimaldi.diffraction.table import Piece, Table
@@ -27,6 +27,8 @@ from grimaldi.scene.model import Source
 mi: Any = mitsuba  # the stubs refuse numbers where arrays are asked for
 
 CORNER = 0.02  # of the tolerance: |M| of a corner that is left out
+CELLS = ACROSS * ACROSS
+ALL = ((1 << CELLS) - 1) << CELLS  # every cell to be tested
 UNTESTED = 0.1  # of the tolerance: |M| of an end that reaches a block or not as a whole, by what its middle says
 
 
@@ -60,6 +62,7 @@ class Lists(NamedTuple):
     """What acts on each block: pieces to be tested, runs of segments that reach it, ends of runs, |M| left out."""
 
     tested: List  # pieces
+    verdicts: Any  # on each of those: CELLS bits of the cells it reaches whole, and CELLS of those where to test it
     first: List  # segments where runs begin
     last: List  # and the last of each
     begins: List  # segments at whose start a far run begins
@@ -75,22 +78,31 @@ class Lists(NamedTuple):
 
 
 class Listed(NamedTuple):
-    """The pieces of the receivers' blocks that are to be tested, as a walk."""
+    """The pieces that reach part of the receivers' blocks, as a walk."""
 
-    list: List
+    lists: Lists
+    cell: Any  # of the receivers, in their blocks
 
     def bounds(self, receivers: Receivers) -> tuple[Any, Any]:
-        return self.list.bounds(receivers.block, receivers.active)
+        return self.lists.tested.bounds(receivers.block, receivers.active)
 
     def visit(self, fr: Frame, i: Any) -> tuple[Any, Any, Any]:  # noqa: ARG002
-        yes = type(i == i)(True)
-        return self.list.item(i), yes, yes
+        open_, ask = self._verdict(i)
+        return self.lists.tested.item(i), open_ | ask, open_ | ask
+
+    def asks(self, i: Any) -> Any:
+        return self._verdict(i)[1]
 
     def after(self, i: Any, inside: Any) -> Any:  # noqa: ARG002
         return i + 1
 
     def weight(self, fr: Frame, piece: Piece) -> Any:  # noqa: ARG002
         return type(fr.z2)(1)
+
+    def _verdict(self, i: Any) -> tuple[Any, Any]:
+        """Whether a piece reaches all of the receivers' cells, and whether it may reach part of them."""
+        bits = dr.gather(mi.UInt32, self.lists.verdicts, i) >> self.cell
+        return (bits & 1) != 0, (bits & (1 << CELLS)) != 0
 
 
 class _Seen(NamedTuple):
@@ -194,14 +206,13 @@ def lists(
     passes = heard & seen.grazed
     dr.eval(open_, heard, far, inner2, start, stop, bend, passes)
 
-    changes = mi.Bool(False)
+    changes = bend > 0
     for side in blocks.beside:
         other = dr.gather(mi.UInt32, side, block) * each + i
         changes |= dr.gather(mi.Bool, open_, other) != open_
     faint = far & (dr.maximum(dr.abs(start), dr.abs(stop)) < UNTESTED * limit)
-    asked = dr.gather(mi.Bool, blocks.asked, block)
-    tested = asked & heard & (changes & ~faint | passes)
-    open_ = asked & open_ & ~tested
+    tested = heard & (changes & ~faint | passes)
+    open_ = open_ & ~tested
     dropped = open_ & far & (inner2 < dr.square(CORNER * limit))
     kept = open_ & ~dropped
     dr.eval(tested, kept, dropped)
@@ -224,8 +235,11 @@ def lists(
     last = dr.gather(mi.UInt32, tab.ranges, 2 * i + 1) - 1
     left = dr.sqrt(dr.block_sum(left2, n)) / (2 * np.pi)
     dr.eval(begins, stops, left, first, last)
+    pieces = List.of(tested, i, n)
+    verdicts = _verdicts(source, tab, probe, blocks, List.of(tested, block, n).items, pieces.items, List.of(tested, mi.UInt32(passes), n).items)
     return Lists(
-        List.of(tested, i, n),
+        pieces,
+        verdicts,
         List.of(kept & ~along, first, n),
         List.of(kept & ~along_after, last, n),
         List.of(begins & ~out_start, first, n),
@@ -233,6 +247,44 @@ def lists(
         left,
         beside,
     )
+
+
+def _verdicts(
+    source: Source, tab: Table, probe: Rays | None, blocks: Blocks, block: Any, item: Any, passes: Any
+) -> Any:
+    """Which cells of their blocks pieces reach, by a ray to each point of the lattice; those that pass others are asked."""
+    if probe is None:
+        return mi.UInt32(0) * item + ALL
+    side = ACROSS + 1
+    index = dr.arange(mi.UInt32, len(item) * side * side)
+    entry = index // (side * side)
+    place = index - entry * (side * side)
+    of, i = dr.gather(mi.UInt32, block, entry), dr.gather(mi.UInt32, item, entry)
+    reached = _reached(source, tab, probe, blocks, of, place, i)
+    bits = dr.block_sum(dr.select(reached, mi.UInt32(1) << place, 0), side * side)
+    whole, none = mi.UInt32(0), mi.UInt32(0)
+    for y in range(ACROSS):
+        for x in range(ACROSS):
+            corners = sum(1 << ((y + dy) * side + x + dx) for dy in (0, 1) for dx in (0, 1))
+            cell = y * ACROSS + x
+            whole |= dr.select((bits & corners) == corners, mi.UInt32(1 << cell), 0)
+            none |= dr.select((bits & corners) == 0, mi.UInt32(1 << cell), 0)
+    verdict = whole | ((~(whole | none) & (ALL >> CELLS)) << CELLS)
+    flat = dr.gather(mi.Float, blocks.bend, block) == 0
+    verdict = dr.select(flat & (passes == 0), verdict, ALL)
+    dr.eval(verdict)
+    return verdict
+
+
+def _reached(source: Source, tab: Table, probe: Rays, blocks: Blocks, of: Any, place: Any, i: Any) -> Any:
+    """Whether pieces reach points of the lattices of blocks."""
+    p = dr.gather(type(blocks.p), blocks.lattice, of * (ACROSS + 1) ** 2 + place)
+    n = dr.gather(type(blocks.n), blocks.n, of)
+    piece = tab.piece(i)
+    acts = sounds(frame(source, p, tab), piece, tab.types.Vector(n))
+    x = mi.Point3f(piece.middle + constant(tab.types.Vector, tab.centre))
+    q = mi.Point3f(p)
+    return acts & probe.reaches(x, piece, q + probe.epsilon(q) * n, acts)
 
 
 @dr.syntax

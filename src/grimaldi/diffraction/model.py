@@ -51,9 +51,11 @@ class Receivers(NamedTuple):
     n: Any  # unit normal of the surface the point lies on, towards the side that is asked; 0 in free space
     active: Any
     block: Any = None  # of `Blocks`, in which each lies; OUTSIDE where it lies in none
+    cell: Any = None  # of that block
 
 
 OUTSIDE = 0xFFFFFFFF
+ACROSS = 4  # cells across a block
 
 
 class Blocks(NamedTuple):
@@ -64,13 +66,13 @@ class Blocks(NamedTuple):
     radius: Any  # of the sphere about p that holds the receivers [scene units]
     bend: Any  # how far their normals differ from n at most; 0 where all lie in the plane through p across n
     active: Any
-    asked: Any  # whether receivers may lie in it; others only tell what reaches them
-    beside: tuple[Any, ...]  # UInt32: blocks around it on the same surface, itself where none is
+    lattice: Any  # Float64 (3): of flat ones, the corners of ACROSS × ACROSS cells, row by row
+    beside: tuple[Any, ...]  # UInt32: blocks around it in the same plane, itself where none is
 
     def of(self, receivers: Receivers, block: Any) -> Any:
         """`block` where receivers lie in it, OUTSIDE elsewhere."""
         active = receivers.active & (block < dr.width(self.p))
-        active &= dr.gather(type(self.asked), self.asked, block, active)
+        active &= dr.gather(type(self.active), self.active, block, active)
         d = receivers.p - dr.gather(type(self.p), self.p, block, active)
         n = dr.gather(type(self.n), self.n, block, active)
         F = type(d.x)

@@ -11,7 +11,7 @@ import mitsuba
 import numpy as np
 from numpy.typing import NDArray
 
-from grimaldi.diffraction.model import OUTSIDE, Blocks, Receivers
+from grimaldi.diffraction.model import ACROSS, OUTSIDE, Blocks, Receivers
 
 mi: Any = mitsuba  # the stubs refuse numbers where arrays are asked for
 
@@ -45,18 +45,24 @@ class Squares:
     down: Any
     top: Any
 
-    def at(self, x: Any, y: Any, receivers: Receivers) -> Any:
-        """The blocks of receivers seen at places of the film [pixels]; OUTSIDE where they lie in none."""
-        i = dr.minimum(mi.UInt32(x) // SIDE, self.across - 1)
-        j = dr.minimum(mi.UInt32(y - self.top) // SIDE, self.down - 1)
-        square = j * self.across + i
+    def placed(self, x: Any, y: Any, receivers: Receivers) -> Receivers:
+        """Receivers seen at places of the film [pixels], with their blocks and cells."""
+        cell = SIDE // ACROSS
+        x = dr.minimum(mi.UInt32(x) // cell, self.across * ACROSS - 1)
+        y = dr.minimum(mi.UInt32(y - self.top) // cell, self.down * ACROSS - 1)
+        square = (y // ACROSS) * self.across + x // ACROSS
         first = self.blocks.of(receivers, square)
         second = self.blocks.of(receivers, dr.gather(mi.UInt32, self.second, square))
-        return dr.select(first == OUTSIDE, second, first)
+        block = dr.select(first == OUTSIDE, second, first)
+        return receivers._replace(block=block, cell=(y % ACROSS) * ACROSS + x % ACROSS)
+
+
+LATTICE = ACROSS + 1
+MIDDLE = LATTICE * LATTICE // 2
 
 
 class _Nodes(NamedTuple):
-    """3 × 3 samples of each square, row by row: (squares, 9, 3) and (squares, 9)."""
+    """Samples at the corners of each square's cells, row by row: (squares, LATTICE², 3) and (squares, LATTICE²)."""
 
     o: Reals
     d: Reals
@@ -76,15 +82,16 @@ class _Group(NamedTuple):
     n: Reals
     radius: Reals  # (squares,)
     bend: Reals
-    member: NDArray[np.bool_]  # (squares, 9): the samples that lie in it
+    member: NDArray[np.bool_]  # (squares, LATTICE²): the samples that lie in it
     there: NDArray[np.bool_]  # (squares,): whether there is any
+    lattice: Reals  # (squares, LATTICE², 3): where the samples' rays meet its plane, if it has one
 
 
 def squares(see: Callable[[Any, Any], Sight], width: int, top: int, rows: int) -> Squares:
     """The blocks of `rows` rows of a film `width` pixels wide, from row `top` on."""
     across, down = -(-width // SIDE), -(-rows // SIDE)
     nodes = _nodes(see, across, down, top)
-    first = _group(nodes, np.where(nodes.lit[:, 4], 4, nodes.lit.argmax(1)), nodes.lit)
+    first = _group(nodes, np.where(nodes.lit[:, MIDDLE], MIDDLE, nodes.lit.argmax(1)), nodes.lit)
     left = nodes.lit & ~first.member
     having = np.flatnonzero(left.any(1))
     second = _group(nodes.of(having), left[having].argmax(1), left[having])
@@ -93,7 +100,7 @@ def squares(see: Callable[[Any, Any], Sight], width: int, top: int, rows: int) -
     both = _Group(*(np.concatenate(pair) for pair in zip(first, second, strict=True)))
     square = np.append(np.arange(across * down), having)
     return Squares(
-        _blocks(both, nodes.of(square), _beside(both, square, index, across, down)),
+        _blocks(both, _beside(both, square, index, across, down)),
         mi.UInt32(index),
         dr.opaque(mi.UInt32, across),
         dr.opaque(mi.UInt32, down),
@@ -102,15 +109,15 @@ def squares(see: Callable[[Any, Any], Sight], width: int, top: int, rows: int) -
 
 
 def _nodes(see: Callable[[Any, Any], Sight], across: int, down: int, top: int) -> _Nodes:
-    """What the camera sees at the corners, sides and middles of squares."""
-    columns = 2 * across + 1
-    y, x = (mi.Float(v.ravel()) for v in np.mgrid[: 2 * down + 1, :columns].astype(np.float32) * (SIDE // 2))
+    """What the camera sees at the corners of cells."""
+    columns = ACROSS * across + 1
+    y, x = (mi.Float(v.ravel()) for v in np.mgrid[: ACROSS * down + 1, :columns].astype(np.float32) * (SIDE // ACROSS))
     sight = see(x, y + top)
     r = sight.receivers
     dr.eval(sight.ray.o, sight.ray.d, r.p, r.n, sight.shape, r.active)
     square = np.arange(across * down)
-    corner = 2 * (square // across) * columns + 2 * (square % across)
-    at = corner[:, None] + np.add.outer(np.arange(3) * columns, np.arange(3)).ravel()
+    corner = ACROSS * (square // across) * columns + ACROSS * (square % across)
+    at = corner[:, None] + np.add.outer(np.arange(LATTICE) * columns, np.arange(LATTICE)).ravel()
     vectors = (np.array(v, np.float64).T[at] for v in (sight.ray.o, sight.ray.d, r.p, r.n))
     return _Nodes(*vectors, sight.shape.numpy()[at].astype(np.int64), r.active.numpy()[at])
 
@@ -123,7 +130,7 @@ def _group(nodes: _Nodes, seed: Integers, candidates: NDArray[np.bool_]) -> _Gro
     with np.errstate(divide="ignore", invalid="ignore"):
         t = ((P[:, None] - nodes.o) * N[:, None]).sum(2) / slant
         plane = nodes.o + t[:, :, None] * nodes.d
-    size = np.linalg.norm(plane - plane[:, 4:5], axis=2).max(1)
+    size = np.linalg.norm(plane - plane[:, MIDDLE : MIDDLE + 1], axis=2).max(1)
     off = np.abs(((nodes.p - P[:, None]) * N[:, None]).sum(2))
     along = (nodes.n * N[:, None]).sum(2) > 1 - PLANE**2
     coplanar = candidates & along & (off <= PLANE * size[:, None])
@@ -135,12 +142,13 @@ def _group(nodes: _Nodes, seed: Integers, candidates: NDArray[np.bool_]) -> _Gro
     alone = same.sum(1) == 1
     away = np.where(alone, 0.5 * np.linalg.norm(nodes.p - nodes.o, axis=2)[of] * np.ptp(nodes.d, axis=1).max(1), away)
     return _Group(
-        np.where(flat[:, None], plane[:, 4], P),
+        np.where(flat[:, None], plane[:, MIDDLE], P),
         N,
         np.where(flat, 1.01 * size, ROOM * away),
         np.where(flat, 0.0, np.where(alone, 2.0, ROOM * turned)),
         np.where(flat[:, None], coplanar, same),
         candidates.any(1),
+        np.where(flat[:, None, None], plane, nodes.p),
     )
 
 
@@ -163,21 +171,15 @@ def _beside(group: _Group, square: Integers, second: NDArray[np.uint32], across:
     return found
 
 
-def _blocks(group: _Group, nodes: _Nodes, beside: list[Integers]) -> Blocks:
-    """On the device, with the samples on curved surfaces as blocks of their own, beside those that they are part of."""
-    of, sample = np.nonzero(group.member & (group.there & (group.bend > 0))[:, None])
-    n = len(group.p)
-    around = np.stack(beside, axis=1)
-    around[of, sample] = n + np.arange(len(of))
-    around = np.concatenate([around, np.repeat(n + np.arange(len(of))[:, None], 9, axis=1)])
-    zero = np.zeros(len(of))
+def _blocks(group: _Group, beside: list[Integers]) -> Blocks:
+    """On the device."""
     single = np.float32
     return Blocks(
-        mi.Point3d(np.concatenate([group.p, nodes.p[of, sample]]).T),
-        mi.Vector3f(np.concatenate([group.n, nodes.n[of, sample]]).T.astype(single)),
-        mi.Float(np.append(group.radius, zero).astype(single)),
-        mi.Float(np.append(group.bend, zero).astype(single)),
-        mi.Bool(np.append(group.there, zero == 0)),
-        mi.Bool(np.append(group.there, zero == 1)),
-        tuple(mi.UInt32(b.astype(np.uint32)) for b in around.T),
+        mi.Point3d(group.p.T),
+        mi.Vector3f(group.n.T.astype(single)),
+        mi.Float(group.radius.astype(single)),
+        mi.Float(group.bend.astype(single)),
+        mi.Bool(group.there),
+        mi.Point3d(group.lattice.reshape(-1, 3).T),
+        tuple(mi.UInt32(b.astype(np.uint32)) for b in beside),
     )

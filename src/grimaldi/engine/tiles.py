@@ -125,7 +125,7 @@ def _sight(light: Light, sensor: Any, shot: Shot, x: Any, y: Any) -> tuple[Sight
 def _nodes(light: Light, beam: Beam, sensor: Any, shot: Shot, film: Squares, x: Any, y: Any) -> Nodes:
     """M of a beam at what the camera sees at places of the film [pixels]."""
     (ray, receivers, shape), si = _sight(light, sensor, shot, x, y)
-    m = beam.factor(receivers._replace(block=film.at(x, y, receivers)))
+    m = beam.factor(film.placed(x, y, receivers))
     n = receivers.n
     pixel = mi.Float(0)
     for o, d in ((ray.o_x, ray.d_x), (ray.o_y, ray.d_y)):
@@ -133,9 +133,10 @@ def _nodes(light: Light, beam: Beam, sensor: Any, shot: Shot, film: Squares, x: 
     return Nodes(mi.Float(m.real), mi.Float(m.imag), mi.Float(m.error), si.t, shape, mi.Float(m.clearance) / pixel)
 
 
-def _block(film: Squares, place: Any, first: Any, receivers: Receivers) -> Any:
-    """The blocks of receivers at places of the film, of those that the camera itself sees."""
-    return dr.select(first, film.at(place.x, place.y, receivers), OUTSIDE)
+def _placed(film: Squares, place: Any, first: Any, receivers: Receivers) -> Receivers:
+    """Receivers at places of the film with their blocks: of those that the camera itself sees."""
+    placed = film.placed(place.x, place.y, receivers)
+    return placed._replace(block=dr.select(first, placed.block, OUTSIDE))
 
 
 def render_tile(light: Light, sensor: Any, shot: Shot, first: int, pixels: int, band: Band | None = None) -> Tile:
@@ -164,8 +165,8 @@ def render_tile(light: Light, sensor: Any, shot: Shot, first: int, pixels: int, 
             known.append((Factor(found.real, found.imag, found.error), found.holds))
         if band is None or band.squares is None:
             return light.reflected(ray, si, bsdf, n, active, known)
-        block = partial(_block, band.squares, film, first)
-        return band.light.reflected(ray, si, bsdf, n, active, known, block)
+        placed = partial(_placed, band.squares, film, first)
+        return band.light.reflected(ray, si, bsdf, n, active, known, placed)
 
     path = trace(
         scene,
