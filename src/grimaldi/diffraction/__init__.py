@@ -15,7 +15,8 @@ def model(name: str) -> Model:
 
     Raises InputError for any other name, with the nearest of these.
     """
-    if name not in get_args(ModelName):
-        raise InputError(f"diffraction: {name!r} is no model; {did_you_mean(name, get_args(ModelName))}")
+    names = sorted(get_args(ModelName))
+    if name not in names:
+        raise InputError(f"diffraction: {name!r} is no model; {did_you_mean(name, names)}")
     found: Model = getattr(import_module(f"{__name__}.{name}"), name)
     return found
