@@ -36,8 +36,9 @@ $(BIN)/uv: Makefile
 	@touch $@
 
 # The lock pins and hashes every extra; as a constraint it installs only those asked for.
+# Compiled here, where pip does it too: else each process compiles a second's worth of imports wherever it may not write.
 $(INSTALLED): $(BIN)/uv pyproject.toml requirements.lock src/grimaldi_libllvm.pth
-	VIRTUAL_ENV=$(VENV) $(BIN)/uv pip install --quiet --constraint requirements.lock --editable ".[$(ALL_EXTRAS)]"
+	VIRTUAL_ENV=$(VENV) $(BIN)/uv pip install --quiet --compile-bytecode --constraint requirements.lock --editable ".[$(ALL_EXTRAS)]"
 	@touch $@
 
 # One lock for every platform and Python; no addresses in it, so that any mirror serves.

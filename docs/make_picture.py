@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 import grimaldi
 from grimaldi.film import automatic_exposure
+from grimaldi.film.layers import Layers
 from grimaldi.film.png import pixels
 
 OUTPUT = Path(__file__).with_name("images") / "creature.png"
@@ -42,7 +43,7 @@ def main() -> None:
     rays = grimaldi.render("creature", size=SIZE, spp=12, diffraction="none")
     exposure = automatic_exposure(rays["picture"])
     OUTPUT.parent.mkdir(exist_ok=True)
-    imsave(OUTPUT, compose(*(pixels(dataset, "picture", exposure) for dataset in (rays, waves))))
+    imsave(OUTPUT, compose(*(pixels(Layers.of(dataset), "picture", exposure) for dataset in (rays, waves))))
 
 
 if __name__ == "__main__":

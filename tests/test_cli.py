@@ -217,7 +217,17 @@ def test_ctrl_c_ends_with_one_line_and_no_file(tmp_path: Path, scene: Path) -> N
 
 def test_a_picture_loads_no_library_that_it_does_not_need(tmp_path: Path) -> None:
     """Each takes as long to import as the picture to compute."""
-    heavy = ["finufft", "matplotlib", "scipy.spatial", "scipy.special", "shapely", "trimesh"]
+    heavy = [
+        "finufft",
+        "matplotlib",
+        "pandas",
+        "pint",
+        "scipy.spatial",
+        "scipy.special",
+        "shapely",
+        "trimesh",
+        "xarray",
+    ]
     arguments = ["grimaldi", "render", "young", "--size", "8x8", "--spp", "1", "-o", str(tmp_path / "x.png")]
     script = (
         f"import sys\nfrom grimaldi.cli import main\nsys.argv = {arguments}\n"

@@ -168,6 +168,19 @@ def test_cells_keep_their_share_and_do_not_reach_over_edges():
     assert sizes[:, :16].min() > sizes[:, 80:96].max()
 
 
+def test_cells_far_too_coarse_for_the_fringes_are_not_halved():
+    asked = []
+
+    def fine_to_the_right(x: Any, y: Any) -> Nodes:
+        asked.append(dr.width(x))
+        real = dr.select(x > 32, dr.cos(7 * x + 11 * y), 1)
+        return Nodes(real, 0 * x, mi.Float(0), 100 + 0 * x, mi.UInt32(1) + mi.UInt32(0 * x), mi.Float(dr.inf))
+
+    film = cells(fine_to_the_right, 64, 0, 64, 2, 1e-5)
+    assert asked == [(2 * 64 // LARGEST + 1) ** 2]
+    assert ((film.size.numpy().reshape(64, 64) > 0) == (np.arange(64) < 32)).all()
+
+
 def test_a_part_of_the_film_has_the_cells_of_the_whole():
     whole, part = cells(waves, 96, 0, 64, 2, 5e-3), cells(waves, 96, LARGEST, 32, 2, 5e-3)
     across = len(whole.size) // 64

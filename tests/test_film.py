@@ -1,5 +1,7 @@
 """Files: what was rendered comes back exactly, and phases have the colours they should."""
 
+from dataclasses import replace
+
 import numpy as np
 import OpenEXR
 import pytest
@@ -10,6 +12,7 @@ from grimaldi import film
 from grimaldi.errors import InputError
 from grimaldi.film import phase
 from grimaldi.film.colour import automatic_exposure, decode_srgb, encode_srgb
+from grimaldi.film.layers import Layers
 
 
 def rendered(*, channels=("R", "G", "B"), wavelengths=(0.4,), groups=("0", "lamp"), size=(5, 7)):
@@ -78,6 +81,22 @@ def test_exr_of_several_wavelengths_in_mono(tmp_path):
     field = layers["U.0.1.re"] + 1j * layers["U.0.1.im"]
     np.testing.assert_array_equal(field, data.U.sel(group="0", wavelength=0.55))
     assert header["wavelength"] == "0.45, 0.55"
+
+
+def test_files_are_the_same_of_a_dataset_in_any_order_and_of_its_plain_arrays(tmp_path):
+    data = rendered()
+    data["error"][0, 0, 1, 2] = np.nan  # where no error is known
+    layers = Layers.of(data)
+    xr.testing.assert_identical(layers.dataset(), data)
+    for name, given in {"a": data, "b": layers, "c": data.transpose("channel", "x", "y", ...)}.items():
+        film.write(given, tmp_path / f"{name}.exr")
+        film.write(given, tmp_path / f"{name}.png", "phase-intensity")
+    for suffix in ("exr", "png"):
+        first, *others = ((tmp_path / f"{name}.{suffix}").read_bytes() for name in "abc")
+        assert others == [first, first]
+    written, header = read(tmp_path / "a.exr")
+    np.testing.assert_array_equal(written["error"], data.error.max(("wavelength", "group")))
+    assert float(header["max_error"]) == float(data.error.max())
 
 
 def test_exposure_takes_the_99th_percentile_of_what_is_lit_to_nine_tenths():
@@ -161,7 +180,7 @@ def test_wrong_input_is_one_clear_line_and_leaves_nothing(tmp_path, name, option
 
 def test_a_failed_write_leaves_the_old_file(tmp_path):
     (tmp_path / "a.exr").write_bytes(b"old")
-    with pytest.raises(KeyError):
-        film.write(rendered().drop_vars("intensity"), tmp_path / "a.exr")
+    with pytest.raises(ValueError, match="shape"):
+        film.write(replace(Layers.of(rendered()), intensity=np.zeros((2, 2), np.float32)), tmp_path / "a.exr")
     assert (tmp_path / "a.exr").read_bytes() == b"old"
     assert len(list(tmp_path.iterdir())) == 1

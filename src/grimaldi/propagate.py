@@ -14,13 +14,14 @@ from grimaldi.diffraction.curves import phase_allowed
 from grimaldi.diffraction.frame import incident
 from grimaldi.diffraction.fresnel_plane import fresnel_plane
 from grimaldi.diffraction.model import Evaluate, Factor, Model, Options, Receivers
+from grimaldi.diffraction.none import none
 from grimaldi.diffraction.planes import planes
 from grimaldi.diffraction.reach import reach
 from grimaldi.diffraction.screen import beyond
 from grimaldi.engine.points import Part, at_points
 from grimaldi.outlines.candidate import least_sag
 from grimaldi.outlines.extract import curve, is_curved, outline
-from grimaldi.outlines.model import Reals
+from grimaldi.outlines.model import Outline, Reals
 from grimaldi.scene.model import Scene, Source
 
 
@@ -47,6 +48,8 @@ def propagate(
 def factor(scene: Scene, source: Source, model: Model, k: float, options: Options, where: Reals) -> Evaluate:
     """M alone, as `propagate` finds it."""
     scene = scene.before(source)
+    if model is none and not scene.screen:  # shadow rays need no outlines
+        return none(scene, source, Outline.empty(), k, options)
     sags, detour = _sags(scene, source, phase_allowed(scene, options.tolerance) / k, where)
     seen = replace(outline(scene, source, sag=sags), detour=detour)
     if model is boundary:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
 from inspect import signature
@@ -13,6 +13,7 @@ import numpy as np
 
 from grimaldi.conventions import check_options
 from grimaldi.errors import GrimaldiWarning, InputError
+from grimaldi.film.layers import Layers
 from grimaldi.options import describe
 
 if TYPE_CHECKING:
@@ -73,20 +74,7 @@ def render(
     Warns:
         GrimaldiWarning: fringes finer than a pixel; emitters and shapes that do not diffract yet.
     """
-    from grimaldi.engine.progress import progress
-    from grimaldi.engine.tiles import bands, render_tile, tiles
-    from grimaldi.fringes import warn_of_fine_fringes
-    from grimaldi.light import prepare
-    from grimaldi.scene import load
-    from grimaldi.scene.checking import require_sensor, require_sources
-    from grimaldi.variants import ensure_variant
-
     check_options(unknown, signature(render).parameters)
-    ensure_variant("rgb")
-    loaded = load(scene, scene_unit=scene_unit, smooth=smooth)
-    require_sensor(loaded)
-    require_sources(loaded)
-    own = _integrator(loaded)
     asked = {
         "wavelength": wavelength,
         "scene_unit": scene_unit,
@@ -101,7 +89,35 @@ def render(
         "epsilon": epsilon,
         "fast": fast,
     }
-    settings = replace(_settings(own), **{name: value for name, value in asked.items() if value is not None})
+    given = {name: value for name, value in asked.items() if value is not None}
+    return layers(scene, given, spp=spp, seed=seed, size=size, max_depth=max_depth, smooth=smooth).dataset()
+
+
+def layers(
+    scene: Any,
+    given: Mapping[str, Any],
+    *,
+    spp: int | None = None,
+    seed: int = 0,
+    size: tuple[int, int] | None = None,
+    max_depth: int | None = None,
+    smooth: int = 0,
+) -> Layers:
+    """What `render` returns, as plain arrays; given: those of `Settings` that differ from the scene's own."""
+    from grimaldi.engine.progress import progress
+    from grimaldi.engine.tiles import bands, render_tile, tiles
+    from grimaldi.fringes import warn_of_fine_fringes
+    from grimaldi.light import prepare
+    from grimaldi.scene import load
+    from grimaldi.scene.checking import require_sensor, require_sources
+    from grimaldi.variants import ensure_variant
+
+    ensure_variant("rgb")
+    loaded = load(scene, scene_unit=given.get("scene_unit"), smooth=smooth)
+    require_sensor(loaded)
+    require_sources(loaded)
+    own = _integrator(loaded)
+    settings = replace(_settings(own), **given)
     settings.check()
     if settings.coherent:
         loaded = load(loaded, coherent=settings.coherent)
@@ -117,7 +133,7 @@ def render(
                 for first, pixels in tiles(light, shot, band):
                     done.append(render_tile(light, sensor, shot, first, pixels, band))
                     advance(pixels)
-    return _dataset(loaded, light, settings, shot, done)
+    return _side_by_side(loaded, light, settings, shot, done)
 
 
 def _integrator(scene: Scene) -> Any:
@@ -186,32 +202,16 @@ def _shot(sensor: Any, own: Any, spp: int | None, seed: int, max_depth: int | No
     return Shot(width, height, count, seed, depth, rr_depth, hidden)
 
 
-def _dataset(scene: Scene, light: Light, settings: Settings, shot: Shot, done: list[Tile]) -> xr.Dataset:
-    """The tiles side by side, with their coordinates and a description."""
-    import xarray as xr
-
+def _side_by_side(scene: Scene, light: Light, settings: Settings, shot: Shot, done: list[Tile]) -> Layers:
+    """The tiles together, with their coordinates and a description."""
     wavelengths = tuple(dict.fromkeys(wavelength for wavelength, _ in light.keys))
     names = tuple(dict.fromkeys(group for _, group in light.keys))
     image = shot.height, shot.width
-    layers = len(wavelengths), len(names), *image
+    of_field = len(wavelengths), len(names), *image
     picture = np.concatenate([tile.picture for tile in done], axis=1)
-    channels = {1: ["L"], 3: ["R", "G", "B"]}[len(picture)]
-    data = {
-        "picture": (("y", "x", "channel"), np.moveaxis(picture.reshape(-1, *image), 0, 2)),
-        "U": (
-            ("wavelength", "group", "y", "x"),
-            np.concatenate([tile.U for tile in done], axis=1).astype(np.complex64).reshape(layers),
-        ),
-        "intensity": (("y", "x"), np.concatenate([tile.intensity for tile in done]).reshape(image)),
-        "error": (
-            ("wavelength", "group", "y", "x"),
-            np.concatenate([tile.error for tile in done], axis=1).reshape(layers),
-        ),
-    }
-    coords = {"wavelength": list(wavelengths), "group": list(names), "channel": channels}
     lost = sum(tile.lost for tile in done)
     if lost:
-        warnings.warn(f"{lost} samples were not finite and are left out", GrimaldiWarning, stacklevel=3)
+        warnings.warn(f"{lost} samples were not finite and are left out", GrimaldiWarning, stacklevel=4)
     attrs = describe(
         scene,
         diffraction=settings.diffraction,
@@ -219,4 +219,13 @@ def _dataset(scene: Scene, light: Light, settings: Settings, shot: Shot, done: l
         options=settings.options(),
     )
     attrs |= {"wavelength": list(wavelengths), "spp": shot.spp, "seed": shot.seed, "non_finite": lost}
-    return xr.Dataset(data, coords, attrs)
+    return Layers(
+        np.moveaxis(picture.reshape(-1, *image), 0, 2),
+        np.concatenate([tile.U for tile in done], axis=1).astype(np.complex64).reshape(of_field),
+        np.concatenate([tile.intensity for tile in done]).reshape(image),
+        np.concatenate([tile.error for tile in done], axis=1).reshape(of_field),
+        {1: ("L",), 3: ("R", "G", "B")}[len(picture)],
+        wavelengths,
+        names,
+        attrs,
+    )

@@ -48,7 +48,7 @@ def render(
     views = ["picture" if path.suffix.lower() == ".exr" else view for path in output]
     for path, shown in zip(output, views, strict=True):
         film.check(path, shown)
-    chosen = options.given(
+    settings = options.given(
         wavelength=wavelength,
         scene_unit=scene_unit,
         diffraction=diffraction,
@@ -61,19 +61,17 @@ def render(
         weights=weights,
         epsilon=epsilon,
         fast=fast,
-        smooth=smooth,
-        max_depth=max_depth,
-        spp=spp,
-        size=None if size is None else parse_size(size),
-        seed=seed,
+    )
+    chosen = options.given(
+        smooth=smooth, max_depth=max_depth, spp=spp, size=None if size is None else parse_size(size), seed=seed
     )
     options.set_variant(variant)
 
-    import grimaldi
+    from grimaldi.rendering import layers
 
-    dataset = grimaldi.render(scene, **chosen)
+    rendered = layers(scene, settings, **chosen)
     for path, shown in zip(output, views, strict=True):
-        film.write(dataset, path, shown)
+        film.write(rendered, path, shown)
 
 
 def parse_size(text: str) -> tuple[int, int]:

@@ -3,12 +3,13 @@
 M = U/U0 is far smoother than U: what a pinhole camera sees of it takes a node every few pixels, fewer where it
 changes slowly. Cells are halved until what a cell's own nodes say differs by little from what the cell around them
 predicted (Runge's comparison: a quadratic through nodes twice as near errs by an eighth), and where an outline's
-shadow is as near as the next node. Cells lie at fixed places of the film, so that any part of a picture has the
-same nodes as the whole.
+shadow is as near as the next node; not where even the finest would differ by too much. Cells lie at fixed places of
+the film, so that any part of a picture has the same nodes as the whole.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -20,6 +21,7 @@ mi: Any = mitsuba  # the stubs refuse numbers where arrays are asked for
 
 LARGEST = 16  # pixels across the largest cells
 HALVED = 0.25  # what halving a cell leaves of a quadratic's error, at most
+AT_BEST = 1 / 16  # what it leaves of it at best: an eighth of a cubic's, less in quarters where M is straighter
 STRAIGHT = 0.5  # what a quadratic leaves of a bilinear function's error, at most
 SIMPSON = 1 / 6, 4 / 6, 1 / 6  # means of quadratics
 IN_PIXEL = 10  # times a mean's error, that M may be off by within a pixel
@@ -137,9 +139,9 @@ def cells(evaluate: Evaluate, width: int, top: int, rows: int, finest: int, shar
     size = LARGEST
     while True:
         _fill(nodes, grid, x, y, size, evaluate)
-        serves, error = _judged(nodes, grid, x, y, size, finest, share)
+        serves, error, halved = _judged(nodes, grid, x, y, size, finest, share)
         levels.append(_level(size, x, y, across * LARGEST // size, down * LARGEST // size, serves, error))
-        left: Any = dr.compress(~serves)
+        left: Any = dr.compress(halved)
         if size == finest or len(left) == 0:
             break
         size //= 2
@@ -165,8 +167,8 @@ def _fill(nodes: _Nodes, grid: _Grid, x: Any, y: Any, size: int, evaluate: Evalu
     dr.eval(nodes.values, nodes.error, nodes.shape, nodes.there)
 
 
-def _judged(nodes: _Nodes, grid: _Grid, x: Any, y: Any, size: int, finest: int, share: float) -> tuple[Any, Any]:
-    """Whether cells serve, and the error of M in them."""
+def _judged(nodes: _Nodes, grid: _Grid, x: Any, y: Any, size: int, finest: int, share: float) -> tuple[Any, Any, Any]:
+    """Whether cells serve, the error of M in them, and whether parts of those that do not may."""
     own = _gathered(nodes, grid, x, y, size)
     index = [grid.node(x, y, size, m, n) for n in range(3) for m in range(3)]
     shape = dr.gather(mi.UInt32, nodes.shape, index[0])
@@ -203,9 +205,11 @@ def _judged(nodes: _Nodes, grid: _Grid, x: Any, y: Any, size: int, finest: int, 
         serves = same & (left <= most)
     else:
         serves = same & (mean <= most) & (left <= IN_PIXEL * most)
+    within = (IN_PIXEL if finest == 1 else 1) * most
+    halved = ~serves & ~(left * AT_BEST ** math.log2(size / finest) > within)  # also where M is NaN
     error += left
-    dr.eval(serves, error)
-    return serves, error
+    dr.eval(serves, error, halved)
+    return serves, error, halved
 
 
 def _gathered(nodes: _Nodes, grid: _Grid, x: Any, y: Any, size: int) -> list[Any]:

@@ -6,8 +6,12 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from time import monotonic
+from typing import TYPE_CHECKING
 
 from grimaldi.engine.interrupt import check
+
+if TYPE_CHECKING:
+    from rich.progress import Progress
 
 
 @contextmanager
@@ -21,6 +25,27 @@ def progress(total: int, label: str) -> Iterator[Callable[[int], None]]:
         yield lambda _: check()
         return
 
+    bar: Progress | None = None
+    done, begun = 0, monotonic()
+
+    def advance(steps: int) -> None:
+        nonlocal bar, done
+        check()
+        done += steps
+        if bar is None and monotonic() - begun > 1:
+            bar = _shown(total, label)
+        if bar is not None:
+            bar.update(bar.task_ids[0], completed=done)
+
+    try:
+        yield advance
+    finally:
+        if bar is not None:
+            bar.stop()
+
+
+def _shown(total: int, label: str) -> Progress:
+    """A bar on stderr with one task; rich is loaded for those who see it."""
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
@@ -32,17 +57,6 @@ def progress(total: int, label: str) -> Iterator[Callable[[int], None]]:
         console=Console(stderr=True),
         transient=True,
     )
-    task = bar.add_task(label, total=total)
-    begun = monotonic()
-
-    def advance(steps: int) -> None:
-        check()
-        bar.advance(task, steps)
-        if not bar.live.is_started and monotonic() - begun > 1:
-            bar.start()
-
-    try:
-        yield advance
-    finally:
-        if bar.live.is_started:
-            bar.stop()
+    bar.add_task(label, total=total)
+    bar.start()
+    return bar

@@ -10,6 +10,7 @@ from grimaldi.errors import InputError
 from grimaldi.files import check_writable
 from grimaldi.film import exr, png
 from grimaldi.film.colour import automatic_exposure
+from grimaldi.film.layers import Layers
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -17,11 +18,13 @@ if TYPE_CHECKING:
 __all__ = ["automatic_exposure", "write"]
 
 
-def write(dataset: xr.Dataset, path: str | Path, view: str = "picture", *, exposure: float | None = None) -> None:
+def write(
+    dataset: xr.Dataset | Layers, path: str | Path, view: str = "picture", *, exposure: float | None = None
+) -> None:
     """Write what `grimaldi.render` returned to `path`: all layers to .exr, one view to .png.
 
     Args:
-        dataset: of `grimaldi.render`.
+        dataset: of `grimaldi.render`, or its plain arrays.
         path: ends in .exr (layers and header: see `film.exr.write`) or .png (8 bit sRGB).
         view: of a PNG: "picture", "phase" (red for 0..π, blue for π..2π, as in the report),
             "phase-cyclic" (even cyclic map), or "phase-intensity" (phase colour times intensity).
@@ -34,10 +37,11 @@ def write(dataset: xr.Dataset, path: str | Path, view: str = "picture", *, expos
             that is missing or not writable.
     """
     check(path, view, exposure=exposure)
+    layers = dataset if isinstance(dataset, Layers) else Layers.of(dataset)
     if Path(path).suffix.lower() == ".exr":
-        exr.write(dataset, path)
+        exr.write(layers, path)
     else:
-        png.write(dataset, path, view, exposure)
+        png.write(layers, path, view, exposure)
 
 
 def check(path: str | Path, view: str = "picture", *, exposure: float | None = None) -> None:

@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from grimaldi.files import replacing
-
-if TYPE_CHECKING:
-    import xarray as xr
+from grimaldi.film.layers import Layers
 
 PHASE_CONVENTION = "phase = arg U in radians, -pi..pi; U ~ exp(i k r - i omega t)"
 
 
-def write(dataset: xr.Dataset, path: str | Path) -> None:
-    """Write a rendered `dataset` to `path`, losslessly.
+def write(layers: Layers, path: str | Path) -> None:
+    """Write rendered `layers` to `path`, losslessly.
 
     Channels (y, x):
 
@@ -31,7 +29,7 @@ def write(dataset: xr.Dataset, path: str | Path) -> None:
     ``U.<group>.im``      ``U.<group>.<index>.re`` and ``.im``
     ===================== ==================================================================
 
-    The header holds the dataset's attributes under their own names (text, so that no digit is lost;
+    The header holds the attributes under their own names (text, so that no digit is lost;
     counts as integers), and ``phase_convention`` and ``max_error``.
     """
     import OpenEXR
@@ -39,30 +37,27 @@ def write(dataset: xr.Dataset, path: str | Path) -> None:
     header = {
         "compression": OpenEXR.ZIP_COMPRESSION,
         "type": OpenEXR.scanlineimage,
-        **{name: _attribute(value) for name, value in dataset.attrs.items()},
+        **{name: _attribute(value) for name, value in layers.attrs.items()},
         "phase_convention": PHASE_CONVENTION,
-        "max_error": repr(float(dataset["error"].max())),
+        "max_error": repr(float(np.fmax.reduce(layers.error, axis=None))),
     }
     with replacing(path) as temporary:
-        OpenEXR.File(header, channels(dataset)).write(str(temporary))
+        OpenEXR.File(header, channels(layers)).write(str(temporary))
 
 
-def channels(dataset: xr.Dataset) -> dict[str, NDArray[np.float32]]:
+def channels(layers: Layers) -> dict[str, NDArray[np.float32]]:
     """The channels of `write` by name, each float32 (y, x)."""
-    picture = dataset["picture"].transpose("y", "x", "channel")
-    field = dataset["U"].transpose("wavelength", "group", "y", "x")
-    layers = {
-        name: picture.sel(channel=name if name in picture["channel"].values else "L").values for name in ("R", "G", "B")
-    }
-    layers["intensity"] = dataset["intensity"].transpose("y", "x").values
-    layers["phase"] = np.angle(field.values[0, 0])
-    layers["error"] = dataset["error"].max(("wavelength", "group")).transpose("y", "x").values
-    for g, group in enumerate(field["group"].values):
-        for i in range(field.sizes["wavelength"]):
-            name = f"U.{group}" if field.sizes["wavelength"] == 1 else f"U.{group}.{i}"
-            layers[f"{name}.re"] = field.values[i, g].real
-            layers[f"{name}.im"] = field.values[i, g].imag
-    return {name: np.ascontiguousarray(values, dtype=np.float32) for name, values in layers.items()}
+    at = layers.channels.index
+    found = {name: layers.picture[..., at(name if name in layers.channels else "L")] for name in ("R", "G", "B")}
+    found["intensity"] = layers.intensity
+    found["phase"] = np.angle(layers.U[0, 0])
+    found["error"] = np.fmax.reduce(layers.error, axis=(0, 1))  # NaN where none is known
+    for g, group in enumerate(layers.groups):
+        for i in range(len(layers.wavelengths)):
+            name = f"U.{group}" if len(layers.wavelengths) == 1 else f"U.{group}.{i}"
+            found[f"{name}.re"] = layers.U[i, g].real
+            found[f"{name}.im"] = layers.U[i, g].imag
+    return {name: np.ascontiguousarray(values, dtype=np.float32) for name, values in found.items()}
 
 
 def _attribute(value: Any) -> str | int:

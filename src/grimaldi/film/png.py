@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,37 +10,34 @@ from numpy.typing import NDArray
 from grimaldi.files import replacing
 from grimaldi.film import phase
 from grimaldi.film.colour import automatic_exposure, decode_srgb, encode_srgb, to_bytes
-
-if TYPE_CHECKING:
-    import xarray as xr
+from grimaldi.film.layers import Layers
 
 VIEWS = ("picture", "phase", "phase-cyclic", "phase-intensity")
 
 
-def write(dataset: xr.Dataset, path: str | Path, view: str, exposure: float | None) -> None:
-    """Write one of VIEWS of `dataset` to `path`; see `pixels`."""
+def write(layers: Layers, path: str | Path, view: str, exposure: float | None) -> None:
+    """Write one of VIEWS of `layers` to `path`; see `pixels`."""
     from PIL import Image
 
     with replacing(path) as temporary:
-        Image.fromarray(pixels(dataset, view, exposure)).save(temporary, format="png")
+        Image.fromarray(pixels(layers, view, exposure)).save(temporary, format="png")
 
 
-def pixels(dataset: xr.Dataset, view: str, exposure: float | None) -> NDArray[np.uint8]:
-    """One of VIEWS of `dataset` as sRGB bytes (y, x, 3).
+def pixels(layers: Layers, view: str, exposure: float | None) -> NDArray[np.uint8]:
+    """One of VIEWS of `layers` as sRGB bytes (y, x, 3).
 
     The phase is that of the first group's field at the first wavelength. `exposure` multiplies the
     linear values of "picture" and "phase-intensity"; None takes `automatic_exposure` of this picture.
     """
     if view == "picture":
-        picture = dataset["picture"].transpose("y", "x", "channel").values
-        rgb = np.broadcast_to(picture, (*picture.shape[:2], 3))
+        rgb = np.broadcast_to(layers.picture, (*layers.picture.shape[:2], 3))
         return to_bytes(encode_srgb(_exposed(rgb, exposure)))
-    field = dataset["U"].transpose("wavelength", "group", "y", "x").values[0, 0]
+    field = layers.U[0, 0]
     if view == "phase":
         return to_bytes(phase.two_colours(field))
     if view == "phase-cyclic":
         return to_bytes(phase.cyclic(field))
-    intensity = _exposed(dataset["intensity"].transpose("y", "x").values, exposure)
+    intensity = _exposed(layers.intensity, exposure)
     return to_bytes(encode_srgb(decode_srgb(phase.two_colours(field)) * intensity[..., None]))
 
 
