@@ -19,10 +19,10 @@ ALLOWED = 0.1
 PATIENCE = 60.0  # for one picture, and for the reference at all strips [s]
 STRIPS, LENGTH = 120, 50  # of pixels in a row, at which the reference is asked
 HOW = (
-    f"Tolerances are the loosest that keep the error within {ALLOWED:.0%}, tried until a picture takes longer than "
-    f"{PATIENCE:g} s: rms of the picture less that at tolerance {REFERENCE:g}, there asked for M at every sample, over "
-    "rms of that less the picture without diffraction, with the same random numbers, over the pixels of strips at "
-    "random places of the film."
+    f"The tolerance is the loosest whose error is within {ALLOWED:.0%}; after a picture that takes longer than "
+    f"{PATIENCE:g} s no stricter one is tried. The error is rms(p - p') / rms(p' - p0) over the pixels of strips at "
+    f"random places of this film, with the same random numbers: p is the picture, p' that at tolerance {REFERENCE:g}, "
+    "M asked for at every sample, and p0 the one without diffraction."
 )
 
 

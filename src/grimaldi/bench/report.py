@@ -65,10 +65,10 @@ def page(sections: Mapping[str, str], where: Mapping[str, str]) -> str:
 
 def kept(text: str, where: Mapping[str, str]) -> dict[str, str]:
     """The sections of an earlier page; none if machine or versions were others."""
-    first, *sections = re.split(r"^(?=## )", text, flags=re.MULTILINE)
-    if first.rstrip() != head(where).rstrip():
+    if not text.startswith(head(where) + "\n"):
         return {}
-    return {s.removeprefix("## ").partition(":")[0]: s.rstrip() + "\n" for s in sections}
+    sections = re.split(r"^## (?=\w+: )", text, flags=re.MULTILINE)[1:]
+    return {section.partition(":")[0]: f"## {section.rstrip()}\n" for section in sections}
 
 
 def section(name: str, row: Result | Skipped, settings: Settings) -> str:
@@ -90,13 +90,12 @@ def measured(target: Target) -> str:
     return f"{value} (to reach: ≤ {_number(target.most, target.unit)})"
 
 
-def write(name: str, row: Result | Skipped, settings: Settings, folder: Path) -> Path:
-    """Put a row into performance.md in `folder`, beside those that are there already; its path."""
+def write(name: str, row: Result | Skipped, settings: Settings, folder: Path) -> None:
+    """Put a row into performance.md in `folder`, beside those that are there already."""
     path, where = folder / PAGE, machine()
     earlier = kept(path.read_text(encoding="utf-8"), where) if path.exists() else {}
     with replacing(path) as temporary:
         temporary.write_text(page({**earlier, name: section(name, row, settings)}, where), encoding="utf-8")
-    return path
 
 
 def table(rows: Sequence[Mapping[str, object]]) -> str:
