@@ -6,6 +6,7 @@ import math
 import signal
 import subprocess
 import sys
+from datetime import date
 from importlib import import_module
 from pathlib import Path
 
@@ -13,17 +14,19 @@ import numpy as np
 import pytest
 
 import grimaldi
-from grimaldi.bench import ROWS, bodies, chosen, error, killeroo, pairs, planar, report, scenes
+from grimaldi.bench import ROWS, bodies, chosen, error, killeroo, memory, pairs, planar, report, scenes
 from grimaldi.bench.error import TOLERANCES, Film
 from grimaldi.bench.model import Result, Settings, Skipped, Target
-from grimaldi.bench.timing import medians
+from grimaldi.bench.timing import beside, medians
 from grimaldi.errors import InputError
 from grimaldi.outlines.extract import edges_of
 from grimaldi.reference import circle
 
 QUICK = ["--quick", "--runs", "1"]
 RESULT = Result(
-    "Said.", ({"": "a|b", "time": "1 s"},), (Target("ratio", 4.0, 5.0, "×"), Target("peak", None, 4.0, "GB"))
+    "Said.",
+    ({"": "a|b", "time": "1 s"}, {"": "", "memory": "2 GB"}),
+    (Target("ratio", 4.0, 5.0, "×"), Target("peak", None, 4.0, "GB")),
 )
 
 
@@ -43,7 +46,7 @@ def test_the_command_prints_its_rows_and_writes_the_page(tmp_path):
         assert f"## {name}: {ROWS[name]}\n" in done.stdout
     assert "--quick" in page
     assert "reached" not in page  # small sizes show nothing of what is to be reached
-    for fact in ("CPU", "Python", "mitsuba", "LLVM", "variant", "date"):
+    for fact in ("CPU", "Python", "mitsuba", "LLVM", "variant"):
         assert f"| {fact} | " in page
     assert [path.name for path in tmp_path.iterdir()] == ["performance.md"]
 
@@ -71,7 +74,7 @@ def test_wrong_input_is_one_line(arguments, says, tmp_path):
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no SIGINT to send to another process")
-def test_an_interrupted_run_leaves_nothing(tmp_path):
+def test_an_interrupted_run_keeps_the_rows_that_were_done(tmp_path):
     words = [sys.executable, "-m", "grimaldi", "bench", *QUICK, "--only", "wavelength,start", "-o", tmp_path]
     running = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     assert running.stdout is not None
@@ -79,7 +82,9 @@ def test_an_interrupted_run_leaves_nothing(tmp_path):
     running.send_signal(signal.SIGINT)
     _, errors = running.communicate(timeout=60)
     assert (running.returncode, errors) == (130, "grimaldi: interrupted\n")
-    assert not list(tmp_path.iterdir())
+    assert [path.name for path in tmp_path.iterdir()] == [report.PAGE]
+    page = (tmp_path / report.PAGE).read_text()
+    assert [line.split(":")[0] for line in page.splitlines() if line.startswith("## ")] == ["## wavelength"]
 
 
 def test_every_row_is_a_module_that_measures():
@@ -108,18 +113,38 @@ def test_verdicts():
 
 
 def test_the_page_says_what_is_reached_and_what_was_left_out():
-    rows = {"killeroo": Skipped("no data"), "memory": RESULT}
-    page = report.page(rows, Settings(seed=3, runs=7), {"CPU": "some"})
+    settings = Settings(seed=3, runs=7)
+    rows = {"memory": RESULT, "killeroo": Skipped("no data")}
+    page = report.page({name: report.section(name, row, settings) for name, row in rows.items()}, {"CPU": "some"})
     lines = page.splitlines()
-    assert "medians of 7 runs" in page
-    assert "`--seed 3`" in page
-    assert "--quick" not in page
+    assert [line.partition(":")[0] for line in lines if line.startswith("## ")] == [
+        "## What was to be reached",
+        "## killeroo",
+        "## memory",
+    ]
+    assert f"Measured on {date.today()} by `--only memory --runs 7 --seed 3`." in lines
     assert "Not measured: no data." in lines
-    assert "| a\\|b | 1 s |" in lines
-    (ratio, peak) = (line for line in lines if line.startswith("| [memory](#"))
-    assert ratio.endswith("| ratio | 4× | ≤ 5× | reached |")
-    assert peak.endswith("| peak | - | ≤ 4 GB | not measured |")
-    assert "](#memory-peak-memory-of-a-picture-of-4096²-pixels-with-1e5-segments)" in ratio
+    assert "| a\\|b | 1 s | - |" in lines
+    assert "|  | - | 2 GB |" in lines
+    ratio, peak = "ratio: 4× (to reach: ≤ 5×), reached", "peak: - (to reach: ≤ 4 GB), not measured"
+    link = "- [memory](#memory-peak-memory-of-a-picture-of-4096²-pixels-with-1e5-segments), "
+    for line in (ratio, peak):
+        assert lines.count(link + line) == 1
+        assert lines.count("- " + line) == 1
+
+
+def test_a_page_keeps_the_rows_of_the_same_machine_that_are_not_measured_anew(tmp_path, monkeypatch):
+    path = tmp_path / report.PAGE
+    done = report.section("memory", RESULT, Settings(seed=1))
+    monkeypatch.setattr(report, "machine", lambda: {"CPU": "one"})
+    report.write("memory", RESULT, Settings(seed=1), tmp_path)
+    for why in ("firstly", "lastly"):
+        report.write("killeroo", Skipped(why), Settings(seed=2), tmp_path)
+    again = report.section("killeroo", Skipped("lastly"), Settings())
+    assert path.read_text() == report.page({"memory": done, "killeroo": again}, {"CPU": "one"})
+    monkeypatch.setattr(report, "machine", lambda: {"CPU": "another"})
+    report.write("killeroo", Skipped("lastly"), Settings(), tmp_path)
+    assert path.read_text() == report.page({"killeroo": again}, {"CPU": "another"})
 
 
 def test_runs_take_turns_after_one_untimed():
@@ -130,20 +155,65 @@ def test_runs_take_turns_after_one_untimed():
     assert second >= 0
 
 
+def test_a_long_picture_is_not_run_again():
+    order: list[str] = []
+    works = (lambda: order.append("a"), lambda: order.append("b"))
+    assert beside(3, 1.0, *works, long=4.0)[2] == 3
+    assert order == ["b", *["a", "b"] * 3]
+    order.clear()
+    assert beside(3, 1.0, *works, long=2.0)[::2] == (1.0, 1)
+    assert order == ["b"] * 4
+
+
 @pytest.mark.parametrize("share", [0.02, 1.0, 30.0, 1e3])
 def test_the_tolerance_is_the_loosest_whose_error_is_allowed(share, monkeypatch):
     """Of pictures that err by `share` times the tolerance, relative to what diffraction changes."""
 
-    def picture(scene, wavelength, film, tolerance=0.0, diffraction="boundary"):
-        change = 0.0 if diffraction == "none" else 2.0 + 2.0 * share * (tolerance - error.REFERENCE)
-        return np.full((4, 4, 3), 5.0 + change)
+    def picture(scene, wavelength, film, tolerance):
+        return np.full((4, 4, 3), 7.0 + 2.0 * share * (tolerance - error.REFERENCE))
+
+    def exact(scene, wavelength, film, patience):
+        return error.Reference(np.arange(5), np.full((5, 3), 7.0), np.full((5, 3), 5.0))
 
     monkeypatch.setattr(error, "picture", picture)
+    monkeypatch.setattr(error, "reference", exact)
     found = error.loosest(None, 1.0, Film(4, 1, 0))  # type: ignore[arg-type]
     errors = [share * (tolerance - error.REFERENCE) for tolerance in TOLERANCES]
     allowed = [tolerance for tolerance, e in zip(TOLERANCES, errors, strict=True) if e <= error.ALLOWED]
     assert found.tolerance == max(allowed, default=TOLERANCES[-1])
     assert found.error == pytest.approx(share * (found.tolerance - error.REFERENCE))
+    assert found.pixels == 5
+    assert ("above 10%" in found.cells()["error"]) == (found.error > error.ALLOWED)
+    hasty = error.loosest(None, 1.0, Film(4, 1, 0), patience=-1.0)  # type: ignore[arg-type]
+    assert hasty.tolerance == TOLERANCES[0]
+
+
+@pytest.mark.filterwarnings("ignore:.*alias:grimaldi.errors.GrimaldiWarning")
+def test_the_reference_is_the_picture_at_its_pixels():
+    """Bit for bit, since a tile is a function of the pixels; so that its error is 0, and that of the rays exactly 1."""
+    film = Film(20, 2, 5)
+    scene = grimaldi.load(scenes.bodies(3, seed=1))
+    found = error.reference(scene, scenes.WAVELENGTH, film)
+    wave = error.picture(scene, scenes.WAVELENGTH, film, tolerance=error.REFERENCE, fast=False)
+    rays = error.picture(scene, scenes.WAVELENGTH, film, diffraction="none")
+    assert len(found.pixels) == 400
+    np.testing.assert_array_equal(found.wave, wave.reshape(-1, 3)[found.pixels])
+    np.testing.assert_array_equal(found.rays, rays.reshape(-1, 3)[found.pixels])
+    assert (found.error(wave), found.error(rays)) == (0, 1)
+    hasty = error.reference(scene, scenes.WAVELENGTH, film, patience=-1.0)
+    np.testing.assert_array_equal(hasty.pixels, found.pixels[: error.LENGTH])
+    np.testing.assert_array_equal(hasty.wave, found.wave[: error.LENGTH])
+
+
+def test_strips_are_apart_on_the_film_and_anywhere():
+    film = Film(700, 16, 3)
+    firsts = np.array(film.strips())
+    assert firsts.tolist() == film.strips() != Film(700, 16, 4).strips()
+    assert len(firsts) == error.STRIPS
+    assert np.diff(np.sort(firsts)).min() >= error.LENGTH
+    assert 0 <= firsts.min() <= firsts.max() <= 700**2 - error.LENGTH
+    # the mean of as many uniform numbers lies within four of its standard deviations
+    assert abs(firsts.mean() / 700**2 - 0.5) < 4 / np.sqrt(12 * error.STRIPS)
 
 
 def test_the_exponent_is_that_of_a_power_law():
@@ -156,7 +226,7 @@ def test_the_exponent_is_that_of_a_power_law():
 
 @pytest.mark.filterwarnings("ignore:.*alias:grimaldi.errors.GrimaldiWarning")
 def test_a_picture_that_would_take_too_long_is_left_out():
-    result = bodies.growth((1, 2, 3), Film(8, 1, 0), Film(8, 1, 0), runs=1, patience=1e-9)
+    result = bodies.growth((1, 2, 3), Film(8, 1, 0), runs=1, patience=1e-9)
     assert [line["time"].startswith("left out") for line in result.lines] == [False, True, True]
     assert result.targets[0].verdict == "not measured"
 
@@ -248,3 +318,15 @@ def test_a_childs_peak_is_its_own():
     code = "from grimaldi.bench.memory import peak; print(peak())"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert 0.01 < float(done.stdout) < 0.3 < held.nbytes / 1e9
+
+
+def test_a_process_that_is_late_is_ended_and_larger_pictures_are_left_out():
+    result = memory.peaks(1, (8, 16), Settings(), patience=0.5)
+    first, *others = result.lines
+    assert first["time"] == "left out: not done in 0.5 s"
+    if Path("/proc/self/status").exists():
+        assert float(first["peak memory"].split()[1]) > 0.001
+    assert [line["time"] for line in others] == ["left out: 8², 1 spp was not done"] * 3
+    assert {target.verdict for target in result.targets} == {"not measured"}
+    with pytest.raises(memory.Late):
+        memory._child(8, 1, 1, 0, patience=0.1)

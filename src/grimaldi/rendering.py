@@ -122,9 +122,9 @@ def layers(
     if settings.coherent:
         loaded = load(loaded, coherent=settings.coherent)
     sensor = loaded.mitsuba.sensors()[0]
-    with _resized(sensor, size):
+    with resized(sensor, size):
         settings = _with_wavelength(settings, loaded, sensor)
-        shot = _shot(sensor, own, spp, seed, max_depth)
+        shot = shot_of(sensor, own, spp, seed, max_depth)
         light = prepare(loaded, settings)
         warn_of_fine_fringes(loaded, sensor, [wavelength for wavelength, _ in light.keys])
         done: list[Tile] = []
@@ -160,7 +160,7 @@ def _with_wavelength(settings: Settings, scene: Scene, sensor: Any) -> Settings:
 
 
 @contextmanager
-def _resized(sensor: Any, size: tuple[int, int] | None) -> Iterator[None]:
+def resized(sensor: Any, size: tuple[int, int] | None) -> Iterator[None]:
     """The sensor with a film of another size, put back afterwards."""
     import mitsuba as mi
 
@@ -185,7 +185,7 @@ def _resized(sensor: Any, size: tuple[int, int] | None) -> Iterator[None]:
         change(*before.values())
 
 
-def _shot(sensor: Any, own: Any, spp: int | None, seed: int, max_depth: int | None) -> Shot:
+def shot_of(sensor: Any, own: Any, spp: int | None, seed: int, max_depth: int | None) -> Shot:
     """Film and sampling from the sensor, paths from the `wave` integrator, unless told otherwise."""
     from grimaldi.engine.tiles import Shot
 

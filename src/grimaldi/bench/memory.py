@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import subprocess
 import sys
 from collections.abc import Sequence
@@ -18,7 +19,7 @@ BODIES = 3_000  # of 33 silhouette edges each
 FILMS = (64, 256, 1024, 4096)
 SAMPLES = (1, 4)
 TOLERANCE = 2e-2
-PATIENCE = 300.0  # a picture that is expected to take longer is left out [s]
+PATIENCE = 300.0  # for one process; one that takes longer is ended, and larger pictures are left out [s]
 MOST = 4.0  # GB
 FLAT = 1.1
 
@@ -31,6 +32,13 @@ class Peak(NamedTuple):
     segments: int
 
 
+class Late(Exception):
+    """A process was not done in time; `memory` is its largest resident size until then [GB], if known."""
+
+    def __init__(self, memory: float | None) -> None:
+        self.memory = memory
+
+
 def measure(settings: Settings) -> Result:
     if settings.quick:
         return peaks(4, (8, 16), settings)
@@ -38,25 +46,28 @@ def measure(settings: Settings) -> Result:
 
 
 def peaks(number: int, films: Sequence[int], settings: Settings, patience: float = PATIENCE) -> Result:
-    """Pictures of ever larger films, of one sample a pixel and of several, as long as they are expected to be done."""
+    """Pictures of ever larger films, of one sample a pixel and of several, until one is not done in time."""
     found: dict[tuple[int, int], Peak] = {}
-    lines = []
+    lines: list[dict[str, str]] = []
+    late = ""
     for size in films:
         for spp in SAMPLES:
-            expected = min((p.time * (size / s) ** 2 * spp / n for (s, n), p in found.items()), default=0.0)
-            if expected > patience:
-                lines.append(_line(size, spp, time=f"left out: at most {expected:.2g} s expected"))
+            lines.append({"film": f"{size}²", "samples a pixel": f"{spp}"})
+            if late:
+                lines[-1]["time"] = f"left out: {late} was not done"
                 continue
-            took = found[size, spp] = _child(size, spp, number, settings.seed)
-            lines.append(
-                _line(
-                    size,
-                    spp,
-                    segments=f"{took.segments:,}",
-                    memory=f"{took.memory:.2f} GB",
-                    time=written(took.time),
-                )
-            )
+            try:
+                took = found[size, spp] = _child(size, spp, number, settings.seed, patience)
+            except Late as error:
+                late = f"{size}², {spp} spp"
+                lines[-1] |= {} if error.memory is None else {"peak memory": f"≥ {error.memory:.2f} GB until then"}
+                lines[-1]["time"] = f"left out: not done in {patience:g} s"
+            else:
+                lines[-1] |= {
+                    "outline segments": f"{took.segments:,}",
+                    "peak memory": f"{took.memory:.2f} GB",
+                    "time": written(took.time),
+                }
     last = [found[films[-1], spp].memory for spp in SAMPLES if (films[-1], spp) in found]
     both = len(last) == len(SAMPLES)
     text = (
@@ -71,33 +82,36 @@ def peaks(number: int, films: Sequence[int], settings: Settings, patience: float
     return Result(text, tuple(lines), targets)
 
 
-def _line(size: int, spp: int, *, segments: str = "-", memory: str = "-", time: str) -> dict[str, str]:
-    return {
-        "film": f"{size}²",
-        "samples a pixel": f"{spp}",
-        "outline segments": segments,
-        "peak memory": memory,
-        "time": time,
-    }
-
-
-def _child(size: int, spp: int, number: int, seed: int) -> Peak:
+def _child(size: int, spp: int, number: int, seed: int, patience: float) -> Peak:
+    """A picture in a process; raises Late where it is not done in `patience` seconds."""
     words = [str(word) for word in (size, spp, number, seed)]
-    done = subprocess.run(
-        [sys.executable, "-m", "grimaldi.bench.memory", *words], check=True, stdout=subprocess.PIPE, text=True
-    )
-    return Peak(**json.loads(done.stdout.splitlines()[-1]))
+    with subprocess.Popen(
+        [sys.executable, "-m", "grimaldi.bench.memory", *words], stdout=subprocess.PIPE, text=True
+    ) as child:
+        try:
+            said, _ = child.communicate(timeout=patience)
+        except subprocess.TimeoutExpired:
+            raise Late(_resident(child.pid)) from None
+        finally:
+            child.kill()
+    if child.returncode:
+        raise subprocess.CalledProcessError(child.returncode, child.args)
+    return Peak(**json.loads(said.splitlines()[-1]))
 
 
 def peak() -> float:
     """The largest resident size of this process so far [GB]."""
     import resource
 
-    status = Path("/proc/self/status")
-    if status.exists():  # ru_maxrss counts what the parent held when it started this process
-        (line,) = (line for line in status.read_text().splitlines() if line.startswith("VmHWM"))
-        return int(line.split()[1]) * 1024 / 1e9
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e9
+    known = _resident("self")  # ru_maxrss counts what the parent held when it started this process
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e9 if known is None else known
+
+
+def _resident(process: int | str) -> float | None:
+    """The largest resident size of a running process so far [GB], where the system tells."""
+    status = Path("/proc", str(process), "status")
+    found = re.search(r"^VmHWM:\s+(\d+) kB", status.read_text(), re.MULTILINE) if status.exists() else None
+    return None if found is None else int(found[1]) * 1024 / 1e9
 
 
 def main() -> None:

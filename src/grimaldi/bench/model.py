@@ -28,7 +28,8 @@ class Target:
 class Result:
     """One row measured.
 
-    text: what was timed, how, and what the error is of; lines: a table, each line by its columns' names.
+    text: what was timed, how, and what the error is of; lines: a table, each line by the names of the columns that it
+    has something in.
     """
 
     text: str
@@ -48,14 +49,13 @@ class Settings:
     """What all rows are asked for.
 
     seed: of scenes and random numbers; runs: timed ones, whose median counts; data: the folder of the benchmark data;
-    reference: side in pixels of the films on which pictures are held against tolerance 1e-4; peers: a Python that has
-    LightPipes or diffractio, this one unless given; quick: small sizes, which show that all works and no more.
+    peers: a Python that has LightPipes or diffractio, this one unless given; quick: small sizes, which show that all
+    works and no more.
     """
 
     seed: int = 0
     runs: int = 5
     data: Path | None = None
-    reference: int = 88
     peers: str | None = None
     quick: bool = False
 

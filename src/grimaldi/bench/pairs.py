@@ -40,22 +40,21 @@ def rates(side: int, segments: int, settings: Settings) -> Result:
     theirs = _hand_written(settings.file("oracle", "roofline.cpp"), segments)
     pairs = len(points) * segments
     error = field_error(scene, points[:: len(points) // 200 + 1], 1.0, TOLERANCE)
-    lines = [_line("`grimaldi.field`", written(ours), f"{pairs / ours:.3g}", f"{error:.1e}")]
+    lines = [
+        {"": "`grimaldi.field`", "time": written(ours), "pairs/s": f"{pairs / ours:.3g}", "error": f"{error:.1e}"},
+        {"": "hand-written loop"},
+    ]
     if isinstance(theirs, str):
-        lines.append(_line("hand-written loop", theirs, "-", "-"))
+        lines[1]["time"] = theirs
     else:
-        lines.append(_line("hand-written loop", written(512**2 * segments / theirs), f"{theirs:.3g}", "not compared"))
-        lines.append(_line("ratio", "-", f"{pairs / ours / theirs:.3g}", "-"))
+        lines[1] |= {"time": written(512**2 * segments / theirs), "pairs/s": f"{theirs:.3g}", "error": "not compared"}
+        lines.append({"": "ratio", "pairs/s": f"{pairs / ours / theirs:.3g}"})
     text = (
         f"{side}² points behind a polygonal hole of {segments:,} sides, one point source, tolerance {TOLERANCE:g}, "
         "along the outlines (`fast=False`). A pair that is left out as too weak counts as one. The error is the "
         "largest |ΔM|."
     )
     return Result(text, tuple(lines))
-
-
-def _line(name: str, time: str, rate: str, error: str) -> dict[str, str]:
-    return {"": name, "time": time, "pairs/s": rate, "error": error}
 
 
 def _hand_written(source: Path | None, segments: int) -> float | str:

@@ -150,7 +150,7 @@ def compare(n: int, settings: Settings) -> Result:
     ours, theirs = (seconds[name] for name in runs)
     error = errors["`grimaldi.field`"]
     lines = [{"": name, "time": written(seconds[name]), "error": f"{errors[name]:.1e}"} for name in seconds]
-    lines += [{"": name, "time": f"not run: {why}", "error": "-"} for name, why in absent.items()]
+    lines += [{"": name, "time": f"not run: {why}"} for name, why in absent.items()]
     targets = [Target("time / plain finufft script", ours / theirs, PLAIN, "×"), Target("error", error, TOLERANCE)]
     for name in LIBRARIES:
         there = name in seconds

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import platform
+import re
 from collections.abc import Mapping, Sequence
 from datetime import date
 from importlib import metadata
@@ -21,16 +22,14 @@ Every figure beside its yardstick, timed in the same run and in turn with it, wr
 
     grimaldi bench -o docs
 
-Times are medians of {runs} runs after one untimed run, unless a row says otherwise; scenes come from `--seed {seed}`.
-Times of two machines do not compare; ratios nearly do.
-"""
-QUICK = """
-These are the small sizes of `--quick`: they show that every row works, and nothing of the figures to reach.
+Times are medians of as many runs as `--runs` of a row says, after one untimed run, unless the row says otherwise.
+A row stays as of its day until it is measured anew, as long as machine and versions are the same. Times of two
+machines do not compare; ratios nearly do.
 """
 
 
 def machine() -> dict[str, str]:
-    """Processor, versions and variant that a time depends on, and the day."""
+    """Processor, versions and variant that a time depends on."""
     import drjit as dr
     import mitsuba as mi
 
@@ -41,31 +40,48 @@ def machine() -> dict[str, str]:
         **{name: metadata.version(name) for name in ("grimaldi", "mitsuba", "drjit", "numpy", "finufft")},
         "LLVM": ".".join(map(str, dr.detail.llvm_version())),
         "variant": str(mi.variant()),
-        "date": date.today().isoformat(),
     }
 
 
-def page(rows: Mapping[str, Result | Skipped], settings: Settings, where: Mapping[str, str]) -> str:
-    """The whole page; `where` as `machine` says it."""
-    targets = [(name, target) for name, row in rows.items() if isinstance(row, Result) for target in row.targets]
-    parts = [INTRO.format(runs=settings.runs, seed=settings.seed) + (QUICK if settings.quick else "")]
-    parts.append(facts(where) + "\n")
-    if targets:
-        parts.append("## What was to be reached\n\n" + table([_summary(*target) for target in targets]) + "\n")
-    parts += [section(name, row) for name, row in rows.items()]
-    return "\n".join(parts)
+def head(where: Mapping[str, str]) -> str:
+    """The start of the page; `where` as `machine` says it."""
+    return f"{INTRO}\n{facts(where)}\n"
 
 
-def section(name: str, row: Result | Skipped) -> str:
+def page(sections: Mapping[str, str], where: Mapping[str, str]) -> str:
+    """The whole page, of sections by the names of their rows."""
+    from grimaldi.bench import ROWS
+
+    there = {name: sections[name] for name in ROWS if name in sections}
+    targets = [
+        f"- [{name}](#{_anchor(name)}), {line.removeprefix('- ')}"
+        for name, text in there.items()
+        for line in text.splitlines()
+        if line.startswith("- ")
+    ]
+    summary = ["## What was to be reached\n\n" + "\n".join(targets) + "\n"] if targets else []
+    return "\n".join([head(where), *summary, *there.values()])
+
+
+def kept(text: str, where: Mapping[str, str]) -> dict[str, str]:
+    """The sections of an earlier page; none if machine or versions were others."""
+    if not text.startswith(head(where) + "\n"):
+        return {}
+    sections = re.split(r"^## (?=\w+: )", text, flags=re.MULTILINE)[1:]
+    return {section.partition(":")[0]: f"## {section.rstrip()}\n" for section in sections}
+
+
+def section(name: str, row: Result | Skipped, settings: Settings) -> str:
     """One row under its heading."""
     from grimaldi.bench import ROWS
 
-    title = ROWS[name]
-    head = f"## {name}: {title}\n"
+    title = f"## {name}: {ROWS[name]}\n"
     if isinstance(row, Skipped):
-        return f"{head}\nNot measured: {row.why}.\n"
+        return f"{title}\nNot measured: {row.why}.\n"
+    small = " --quick`: small sizes, which show that the row works and nothing more" if settings.quick else "`"
+    asked = f"Measured on {date.today()} by `--only {name} --runs {settings.runs} --seed {settings.seed}{small}.\n"
     said = "".join(f"- {target.what}: {measured(target)}, {target.verdict}\n" for target in row.targets)
-    return "\n".join([head, row.text + "\n", table(row.lines) + "\n", *([said] if said else [])])
+    return "\n".join([title, row.text + "\n", asked, table(row.lines) + "\n", *([said] if said else [])])
 
 
 def measured(target: Target) -> str:
@@ -74,34 +90,24 @@ def measured(target: Target) -> str:
     return f"{value} (to reach: ≤ {_number(target.most, target.unit)})"
 
 
-def write(rows: Mapping[str, Result | Skipped], settings: Settings, folder: Path) -> Path:
-    """performance.md in `folder`; its path."""
-    path = folder / PAGE
+def write(name: str, row: Result | Skipped, settings: Settings, folder: Path) -> None:
+    """Put a row into performance.md in `folder`, beside those that are there already."""
+    path, where = folder / PAGE, machine()
+    earlier = kept(path.read_text(encoding="utf-8"), where) if path.exists() else {}
     with replacing(path) as temporary:
-        temporary.write_text(page(rows, settings, machine()), encoding="utf-8")
-    return path
+        temporary.write_text(page({**earlier, name: section(name, row, settings)}, where), encoding="utf-8")
 
 
 def table(rows: Sequence[Mapping[str, object]]) -> str:
-    """A markdown table with the keys of the first row as its head."""
-    head = list(rows[0])
-    lines = [head, ["---"] * len(head), *([str(row[key]).replace("|", "\\|") for key in head] for row in rows)]
-    return "\n".join("| " + " | ".join(line) + " |" for line in lines)
+    """A markdown table of all columns that rows have, in their order; "-" where one has nothing."""
+    columns = list(dict.fromkeys(key for row in rows for key in row))
+    cells = [[str(row.get(column, "-")).replace("|", "\\|") for column in columns] for row in rows]
+    return "\n".join("| " + " | ".join(line) + " |" for line in [columns, ["---"] * len(columns), *cells])
 
 
 def facts(values: Mapping[str, object]) -> str:
     """A markdown table of names and values."""
     return table([{"": key, "value": value} for key, value in values.items()])
-
-
-def _summary(name: str, target: Target) -> dict[str, str]:
-    return {
-        "row": f"[{name}](#{_anchor(name)})",
-        "figure": target.what,
-        "measured": "-" if target.value is None else _number(target.value, target.unit),
-        "to reach": f"≤ {_number(target.most, target.unit)}",
-        "": target.verdict,
-    }
 
 
 def _anchor(name: str) -> str:

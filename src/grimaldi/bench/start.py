@@ -36,7 +36,7 @@ def first_pictures(scenes: Sequence[str], size: int, settings: Settings) -> Resu
             Target(f"{scene}, full cache", warm, WARM, "s"),
         ]
     aid = statistics.median(_command(["--help"], os.environ) for _ in range(settings.runs))
-    lines.append({"": "`--help`", "empty cache": "-", "full cache": written(aid)})
+    lines.append({"": "`--help`", "full cache": written(aid)})
     text = (
         f"`grimaldi render SCENE --size {size}x{size} --spp 1 -o OUT.png` as a process: start of Python, loading, "
         "compiling and writing included, at the default tolerance of 1e-3. The cache is Dr.Jit's, a new folder each "

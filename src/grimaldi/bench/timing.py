@@ -12,6 +12,8 @@ from grimaldi.scene.model import Scene
 
 T = TypeVar("T")
 
+LONG = 120.0  # all timed runs of a picture [s]
+
 
 def timed(work: Callable[[], T]) -> tuple[T, float]:
     """What `work` returns, and the seconds that it takes, Dr.Jit's kernels included."""
@@ -28,6 +30,25 @@ def medians(runs: int, *works: Callable[[], Any]) -> tuple[float, ...]:
     """The median seconds of each of `works`, run in turn; once more each at first, untimed, to compile kernels."""
     for work in works:
         work()
+    return _in_turn(runs, *works)
+
+
+def beside(
+    runs: int, once: float, work: Callable[[], Any], yardstick: Callable[[], Any], long: float = LONG
+) -> tuple[float, float, int]:
+    """The median seconds of `work`, which ran before in `once` seconds, and of its yardstick; the runs of `work`.
+
+    They run in turn. Where all runs would take more than `long` [s], `once` counts, which is one run.
+    """
+    yardstick()
+    if runs * once > long:
+        (theirs,) = _in_turn(runs, yardstick)
+        return once, theirs, 1
+    ours, theirs = _in_turn(runs, work, yardstick)
+    return ours, theirs, runs
+
+
+def _in_turn(runs: int, *works: Callable[[], Any]) -> tuple[float, ...]:
     times = [[timed(work)[1] for work in works] for _ in range(runs)]
     return tuple(map(statistics.median, zip(*times, strict=True)))
 

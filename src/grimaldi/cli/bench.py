@@ -19,12 +19,11 @@ def bench(
     seed: Annotated[int, typer.Option(help="Of scenes and random numbers.")] = 0,
     runs: Annotated[int, typer.Option(help="Timed runs, whose median counts.")] = 5,
     quick: Annotated[bool, typer.Option("--quick", help="Small sizes: to see that all works.")] = False,
-    reference: Annotated[
-        int, typer.Option(help="Side of the film on which pictures are held against tolerance 1e-4.", metavar="PIXELS")
-    ] = 88,
     output: Annotated[
         Path | None,
-        typer.Option("--output", "-o", help="Write performance.md, of these rows, into this folder.", metavar="DIR"),
+        typer.Option(
+            "--output", "-o", help="Put each row, as it is done, into performance.md in this folder.", metavar="DIR"
+        ),
     ] = None,
     data: Annotated[
         Path | None, typer.Option(help="Folder of the benchmark data.  [default: ../shared, if there]")
@@ -45,7 +44,6 @@ def bench(
         return
     names = chosen([name.strip() for name in only.split(",")] if only is not None else [])
     _check_number("--runs", runs, 1, 1000)
-    _check_number("--reference", reference, 8, 4096)
     _check_number("--seed", seed, 0, 2**32 - 1)
     if output is not None and not output.is_dir():
         raise InputError(f"{output}: is no folder; make it first")
@@ -62,14 +60,14 @@ def bench(
     if output is not None:
         check_writable(output / report.PAGE)
     options.set_variant(variant)
-    settings = Settings(seed, runs, data or benchmark_data(), reference, peers, quick)
-    rows = {}
+    settings = Settings(seed, runs, data or benchmark_data(), peers, quick)
     for name, row in run(names, settings):
-        rows[name] = row
-        print(report.section(name, row), flush=True)
+        if output is not None:
+            report.write(name, row, settings, output)
+        print(report.section(name, row, settings), flush=True)
     print(report.facts(report.machine()))
     if output is not None:
-        print(report.write(rows, settings, output))
+        print(output / report.PAGE)
 
 
 def _check_number(name: str, value: int, least: int, most: int) -> None:
