@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from hashlib import blake2b
 from itertools import zip_longest
 from typing import Any, NamedTuple
@@ -19,7 +19,7 @@ from grimaldi.conventions import Wavelength, parse_wavelengths
 from grimaldi.diffraction import model
 from grimaldi.diffraction.boundary import boundary
 from grimaldi.diffraction.frame import toward
-from grimaldi.diffraction.model import Blocks, Evaluate, Factor, Options, Receivers, among
+from grimaldi.diffraction.model import Evaluate, Factor, Options, Receivers
 from grimaldi.diffraction.none import none
 from grimaldi.engine.hits import Hits, hits
 from grimaldi.errors import InputError
@@ -90,10 +90,6 @@ class Light:
                 raise InputError(f"wave: groups names {name!r}; the scene has {', '.join(dict.fromkeys(present))}")
         return [present.index(name) for name in names]
 
-    def among(self, blocks: Blocks) -> Light:
-        """The same light, quicker at receivers that lie in these blocks."""
-        return replace(self, beams=tuple(beam._replace(factor=among(beam.factor, blocks)) for beam in self.beams))
-
     def reflected(
         self,
         ray: Any,
@@ -102,17 +98,13 @@ class Light:
         n: Any,
         active: Any,
         known: Sequence[tuple[Factor, Any]] = (),
-        placed: Callable[[Receivers], Receivers] | None = None,
     ) -> Reflected:
         """Eq. 3a where rays met surfaces: radiance back along them, and U of each key.
 
-        known: M of each beam, and where it holds; elsewhere it is asked of the model. placed: adds the blocks of `among` that
-        receivers lie in.
+        known: M of each beam, and where it holds; elsewhere it is asked of the model.
         """
         p = self.hits.point(ray, si, active)
         receivers = Receivers(p, n, active)
-        if placed is not None:
-            receivers = placed(receivers)
         context = mi.BSDFContext()
         zero = type(p.x)(0)
         real, imag, error = ([zero] * len(self.keys) for _ in range(3))

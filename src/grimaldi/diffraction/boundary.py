@@ -21,7 +21,7 @@ from grimaldi.diffraction.edges import Everywhere, Margins, Sum, body_sum, lit_s
 from grimaldi.diffraction.frame import Frame, frame
 from grimaldi.diffraction.grazing import chords, near
 from grimaldi.diffraction.lists import Listed, Lists, listed_sum, lists
-from grimaldi.diffraction.model import OUTSIDE, Blocks, Evaluate, Factor, Grouped, Options, Receivers, among
+from grimaldi.diffraction.model import OUTSIDE, Blocks, Evaluate, Factor, Grouped, Options, Receivers
 from grimaldi.diffraction.occlusion import Rays, rays
 from grimaldi.diffraction.screen import beyond
 from grimaldi.diffraction.segment import Rule
@@ -88,9 +88,9 @@ class _Either(NamedTuple):
         if not (isinstance(self.single, _Bodies) and isinstance(self.double, _Bodies)):
             return self
         found = self.single.lists(blocks)
-        return self if found is None else self._replace(
-            single=partial(_listed, self.single, found), double=partial(_listed, self.double, found)
-        )
+        if found is None:
+            return self
+        return self._replace(single=partial(self.single, found=found), double=partial(self.double, found=found))
 
 
 @dr.syntax
@@ -197,6 +197,8 @@ class _Bodies:
     def __call__(self, receivers: Receivers, found: Lists | None = None) -> Factor:
         _, source, _, k, options, _ = self.problem
         tab, rule = self.tab, self.rule
+        if found is not None:
+            receivers = receivers._replace(active=receivers.active & (receivers.block != OUTSIDE))
         fr = frame(source, receivers.p, tab)
         if found is not None:
             beside = found.near(receivers, self.grazing)
@@ -227,9 +229,9 @@ class _Bodies:
         return self.rays if self.problem.options.occlusion != "none" else None
 
     def among(self, blocks: Blocks) -> Evaluate:
-        """By lists of what acts on the blocks; receivers that lie in none ask all pieces."""
+        """By lists of what acts on the blocks."""
         found = self.lists(blocks)
-        return self if found is None else partial(_listed, self, found)
+        return self if found is None else partial(self, found=found)
 
     def lists(self, blocks: Blocks) -> Lists | None:
         """What acts on each block; None where ends of runs are not enough."""
@@ -241,15 +243,3 @@ class _Bodies:
         return lists(source, tab, k, corners, options.tolerance, self.share, self.probe, self.grazing, blocks)
 
 
-@dr.syntax
-def _listed(bodies: _Bodies, found: Lists, receivers: Receivers) -> Factor:
-    """By the lists of blocks, and by all pieces where receivers lie in no block."""
-    F = bodies.tab.types.Float
-    listed = receivers.active & (receivers.block != OUTSIDE)
-    m = bodies(receivers._replace(active=listed), found)
-    real, imag, error, clearance = F(m.real), F(m.imag), F(m.error), F(m.clearance)
-    other = receivers.active & ~listed
-    if other:
-        own = bodies(receivers._replace(active=other))
-        real, imag, error, clearance = F(own.real), F(own.imag), F(own.error), F(own.clearance)
-    return Factor(real, imag, error, clearance)

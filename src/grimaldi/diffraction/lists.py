@@ -235,11 +235,11 @@ def lists(
     last = dr.gather(mi.UInt32, tab.ranges, 2 * i + 1) - 1
     left = dr.sqrt(dr.block_sum(left2, n)) / (2 * np.pi)
     dr.eval(begins, stops, left, first, last)
-    pieces = List.of(tested, i, n)
-    verdicts = _verdicts(source, tab, probe, blocks, List.of(tested, block, n).items, pieces.items, List.of(tested, mi.UInt32(passes), n).items)
+    verdicts = _verdicts(source, tab, probe, blocks, tested, passes, n)
+    reaches = verdicts != 0
     return Lists(
-        pieces,
-        verdicts,
+        List.of(reaches, i, n),
+        List.of(reaches, verdicts, n).items,
         List.of(kept & ~along, first, n),
         List.of(kept & ~along_after, last, n),
         List.of(begins & ~out_start, first, n),
@@ -250,36 +250,44 @@ def lists(
 
 
 def _verdicts(
-    source: Source, tab: Table, probe: Rays | None, blocks: Blocks, block: Any, item: Any, passes: Any
+    source: Source, tab: Table, probe: Rays | None, blocks: Blocks, tested: Any, passes: Any, n: int
 ) -> Any:
-    """Which cells of their blocks pieces reach, by a ray to each point of the lattice; those that pass others are asked."""
-    if probe is None:
-        return mi.UInt32(0) * item + ALL
+    """Which cells of blocks pieces reach, of those that are `tested`: by a ray to each corner of the cells.
+
+    Where corners differ, or lie on another surface, the cell is to be asked, and all of them for what `passes` others.
+    """
+    found = dr.zeros(mi.UInt32, len(tested))
+    pair = dr.compress(tested)
+    if probe is None or len(pair) == 0:
+        dr.scatter(found, mi.UInt32(ALL), pair)
+        return found
     side = ACROSS + 1
-    index = dr.arange(mi.UInt32, len(item) * side * side)
+    index = dr.arange(mi.UInt32, len(pair) * side * side)
     entry = index // (side * side)
     place = index - entry * (side * side)
-    of, i = dr.gather(mi.UInt32, block, entry), dr.gather(mi.UInt32, item, entry)
-    reached = _reached(source, tab, probe, blocks, of, place, i)
+    of = dr.gather(mi.UInt32, pair, entry)
+    reached = _reached(source, tab, probe, blocks, of // n, place, of % n)
     bits = dr.block_sum(dr.select(reached, mi.UInt32(1) << place, 0), side * side)
+    members = dr.gather(mi.UInt32, blocks.members, pair // n)
     whole, none = mi.UInt32(0), mi.UInt32(0)
     for y in range(ACROSS):
         for x in range(ACROSS):
             corners = sum(1 << ((y + dy) * side + x + dx) for dy in (0, 1) for dx in (0, 1))
-            cell = y * ACROSS + x
-            whole |= dr.select((bits & corners) == corners, mi.UInt32(1 << cell), 0)
-            none |= dr.select((bits & corners) == 0, mi.UInt32(1 << cell), 0)
+            cell = 1 << (y * ACROSS + x)
+            same = (members & corners) == corners
+            whole |= dr.select(same & ((bits & corners) == corners), cell, 0)
+            none |= dr.select(same & ((bits & corners) == 0), cell, 0)
     verdict = whole | ((~(whole | none) & (ALL >> CELLS)) << CELLS)
-    flat = dr.gather(mi.Float, blocks.bend, block) == 0
-    verdict = dr.select(flat & (passes == 0), verdict, ALL)
-    dr.eval(verdict)
-    return verdict
+    dr.scatter(found, dr.select(dr.gather(mi.Bool, passes, pair), ALL, verdict), pair)
+    dr.eval(found)
+    return found
 
 
 def _reached(source: Source, tab: Table, probe: Rays, blocks: Blocks, of: Any, place: Any, i: Any) -> Any:
-    """Whether pieces reach points of the lattices of blocks."""
-    p = dr.gather(type(blocks.p), blocks.lattice, of * (ACROSS + 1) ** 2 + place)
-    n = dr.gather(type(blocks.n), blocks.n, of)
+    """Whether pieces reach corners of cells of blocks."""
+    at = of * (ACROSS + 1) ** 2 + place
+    p = dr.gather(type(blocks.lattice), blocks.lattice, at)
+    n = dr.gather(type(blocks.normals), blocks.normals, at)
     piece = tab.piece(i)
     acts = sounds(frame(source, p, tab), piece, tab.types.Vector(n))
     x = mi.Point3f(piece.middle + constant(tab.types.Vector, tab.centre))

@@ -66,7 +66,9 @@ class Blocks(NamedTuple):
     radius: Any  # of the sphere about p that holds the receivers [scene units]
     bend: Any  # how far their normals differ from n at most; 0 where all lie in the plane through p across n
     active: Any
-    lattice: Any  # Float64 (3): of flat ones, the corners of ACROSS × ACROSS cells, row by row
+    lattice: Any  # Float64 (3): receivers at the corners of ACROSS × ACROSS cells of each, row by row
+    normals: Any  # as n, there
+    members: Any  # UInt32: a bit for each of those that lies on the same surface
     beside: tuple[Any, ...]  # UInt32: blocks around it in the same plane, itself where none is
 
     def of(self, receivers: Receivers, block: Any) -> Any:
@@ -107,14 +109,9 @@ class Grouped(Protocol):
     def __call__(self, receivers: Receivers) -> Factor: ...
 
     def among(self, blocks: Blocks) -> Evaluate:
-        """The same for receivers whose `block` is told."""
+        """The same for receivers in blocks; what lies OUTSIDE of all gets no M of any meaning."""
         ...
 
 
 Model = Callable[[Scene, Source, Outline, float, Options], Evaluate]
 """model(scene, source, outline, k, options); a pure function of blocks of points, traceable by Dr.Jit."""
-
-
-def among(evaluate: Evaluate, blocks: Blocks) -> Evaluate:
-    """The same for receivers whose `block` is told, where that helps."""
-    return evaluate.among(blocks) if isinstance(evaluate, Grouped) else evaluate

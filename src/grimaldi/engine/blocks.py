@@ -85,6 +85,7 @@ class _Group(NamedTuple):
     member: NDArray[np.bool_]  # (squares, LATTICE²): the samples that lie in it
     there: NDArray[np.bool_]  # (squares,): whether there is any
     lattice: Reals  # (squares, LATTICE², 3): where the samples' rays meet its plane, if it has one
+    normals: Reals
 
 
 def squares(see: Callable[[Any, Any], Sight], width: int, top: int, rows: int) -> Squares:
@@ -149,6 +150,7 @@ def _group(nodes: _Nodes, seed: Integers, candidates: NDArray[np.bool_]) -> _Gro
         np.where(flat[:, None], coplanar, same),
         candidates.any(1),
         np.where(flat[:, None, None], plane, nodes.p),
+        np.where(flat[:, None, None], N[:, None], nodes.n),
     )
 
 
@@ -181,5 +183,7 @@ def _blocks(group: _Group, beside: list[Integers]) -> Blocks:
         mi.Float(group.bend.astype(single)),
         mi.Bool(group.there),
         mi.Point3d(group.lattice.reshape(-1, 3).T),
+        mi.Vector3f(group.normals.reshape(-1, 3).T.astype(single)),
+        mi.UInt32(((group.member | (group.bend == 0)[:, None]) << np.arange(LATTICE**2)).sum(1).astype(np.uint32)),
         tuple(mi.UInt32(b.astype(np.uint32)) for b in beside),
     )

@@ -66,6 +66,11 @@ class Cells:
     error: Any
     unknown: int  # pixels without a cell
 
+    def knows(self, x: Any, y: Any) -> Any:
+        """Whether pixels (x, y) of the film have a cell."""
+        pixel = (y - mi.UInt32(self.grid.top)) * self.grid.pixels + x
+        return dr.gather(mi.UInt32, self.size, pixel) > 0
+
     def at(self, x: Any, y: Any, distance: Any, shape: Any, active: Any) -> Known:
         """M where a ray through (x, y) of the film [pixels] met a surface at a distance."""
         y = y - self.grid.top
@@ -92,6 +97,17 @@ class _Grid(NamedTuple):
     columns: Any
     shift: int
     top: Any
+
+    def square_by_square(self, rows: int) -> tuple[Any, Any]:
+        """All nodes' indices, those of a square of the largest cells' size together, and which of them there are."""
+        side = 2 * LARGEST >> self.shift
+        across = (self.columns + (side - 1)) // side
+        down = -(-rows // side)
+        index = dr.arange(mi.UInt32, int(across[0]) * down * side * side)
+        square, within = index // (side * side), index % (side * side)
+        column = (square % across) * side + within % side
+        row = (square // across) * side + within // side
+        return row * self.columns + column, (row < rows) & (column < self.columns)
 
     def node(self, x: Any, y: Any, size: Any, m: int, n: int) -> Any:
         """The index of node (m, n) of 3 × 3 in the cell at pixel (x, y)."""
@@ -132,13 +148,15 @@ def cells(evaluate: Evaluate, width: int, top: int, rows: int, finest: int, shar
         finest.bit_length() - 1,
         dr.opaque(mi.Float, top),
     )
-    nodes = _Nodes.empty(columns * (2 * down * LARGEST // finest + 1))
+    node_rows = 2 * down * LARGEST // finest + 1
+    nodes = _Nodes.empty(columns * node_rows)
+    order = grid.square_by_square(node_rows)
     index = dr.arange(mi.UInt32, across * down)
     x, y = (index % across) * LARGEST, (index // across) * LARGEST
     levels: list[_Level] = []
     size = LARGEST
     while True:
-        _fill(nodes, grid, x, y, size, evaluate)
+        _fill(nodes, grid, order, x, y, size, evaluate)
         serves, error, halved = _judged(nodes, grid, x, y, size, finest, share)
         levels.append(_level(size, x, y, across * LARGEST // size, down * LARGEST // size, serves, error))
         left: Any = dr.compress(halved)
@@ -149,13 +167,18 @@ def cells(evaluate: Evaluate, width: int, top: int, rows: int, finest: int, shar
     return _by_pixel(nodes, grid, levels, across * LARGEST, down * LARGEST)
 
 
-def _fill(nodes: _Nodes, grid: _Grid, x: Any, y: Any, size: int, evaluate: Evaluate) -> None:
-    """Ask for M at the nodes of cells that are not there yet."""
+def _fill(
+    nodes: _Nodes, grid: _Grid, order: tuple[Any, Any], x: Any, y: Any, size: int, evaluate: Evaluate
+) -> None:
+    """Ask for M at the nodes of cells that are not there yet, neighbours together: they are quicker so."""
     asked = dr.zeros(mi.Bool, len(nodes.there))
     for n in range(3):
         for m in range(3):
             dr.scatter(asked, mi.Bool(True), grid.node(x, y, size, m, n))
-    index = dr.compress(asked & ~nodes.there)
+    asked &= ~nodes.there
+    index = dr.gather(mi.UInt32, order[0], dr.compress(dr.gather(mi.Bool, asked, order[0], order[1])))
+    if len(index) == 0:
+        return
     step = 0.5 * (1 << grid.shift)
     row = index // grid.columns
     found = evaluate(step * mi.Float(index - row * grid.columns), grid.top + step * mi.Float(row))

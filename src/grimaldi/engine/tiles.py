@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import drjit as dr
 import mitsuba
@@ -17,14 +17,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from grimaldi.diffraction.model import OUTSIDE, Factor, Receivers
-from grimaldi.engine.blocks import Sight, Squares, squares
-from grimaldi.engine.cells import LARGEST, Cells, Nodes, cells
-from grimaldi.light import Beam, Light, Reflected
+from grimaldi.engine.asking import Ask, ask
+from grimaldi.engine.blocks import Sight, squares
+from grimaldi.engine.cells import LARGEST, Cells, Known, Nodes, cells
+from grimaldi.light import Light, Reflected
 from grimaldi.tracing import trace
 
 mi: Any = mitsuba  # the stubs refuse numbers where arrays are asked for
 
-ASKED = 1 << 16  # rays of a tile at whose ends the model is asked for M: about a second of work
+ASKED = 1 << 19  # rays of a tile at whose ends the model is asked for M: a few seconds of work
 RAYS = 1 << 21  # of a tile in all: some hundred bytes each
 NODES = 1 << 23  # of the cells of a band of the film: some twenty bytes each
 
@@ -78,14 +79,13 @@ class Band:
     top: int
     rows: int
     cells: tuple[Cells, ...]
-    light: Light  # that knows what acts on the blocks of the film
-    squares: Squares | None
+    asks: tuple[Ask, ...]
 
 
 def bands(light: Light, sensor: Any, shot: Shot) -> Iterator[Band]:
     """The film from its top on, as many rows at once as memory allows."""
     if light.interpolated == 0 or sensor.needs_aperture_sample():
-        yield Band(0, shot.height, (), light, None)
+        yield Band(0, shot.height, (), ())
         return
     finest = (
         1 if shot.spp >= 8 else 2 if shot.spp >= 2 else 4
@@ -95,10 +95,10 @@ def bands(light: Light, sensor: Any, shot: Shot) -> Iterator[Band]:
     for top in range(0, shot.height, step):
         rows = min(step, shot.height - top)
         film = squares(lambda x, y: _sight(light, sensor, shot, x, y)[0], shot.width, top, rows)
-        known = light.among(film.blocks)
-        nodes = (partial(_nodes, known, beam, sensor, shot, film) for beam in known.beams)
-        found = tuple(cells(ask, shot.width, top, rows, finest, light.interpolated) for ask in nodes)
-        yield Band(top, rows, found, known, film)
+        asks = tuple(ask(film, beam.factor) for beam in light.beams)
+        nodes = (partial(_nodes, light, a, sensor, shot) for a in asks)
+        found = tuple(cells(at, shot.width, top, rows, finest, light.interpolated) for at in nodes)
+        yield Band(top, rows, found, asks)
 
 
 def tiles(light: Light, shot: Shot, band: Band) -> Iterator[tuple[int, int]]:
@@ -122,10 +122,10 @@ def _sight(light: Light, sensor: Any, shot: Shot, x: Any, y: Any) -> tuple[Sight
     return Sight(ray, Receivers(light.hits.point(ray, si, lit), n, lit), shape), si
 
 
-def _nodes(light: Light, beam: Beam, sensor: Any, shot: Shot, film: Squares, x: Any, y: Any) -> Nodes:
-    """M of a beam at what the camera sees at places of the film [pixels]."""
+def _nodes(light: Light, ask: Ask, sensor: Any, shot: Shot, x: Any, y: Any) -> Nodes:
+    """M at what the camera sees at places of the film [pixels]."""
     (ray, receivers, shape), si = _sight(light, sensor, shot, x, y)
-    m = beam.factor(film.placed(x, y, receivers))
+    m = ask(x, y, receivers)
     n = receivers.n
     pixel = mi.Float(0)
     for o, d in ((ray.o_x, ray.d_x), (ray.o_y, ray.d_y)):
@@ -133,24 +133,61 @@ def _nodes(light: Light, beam: Beam, sensor: Any, shot: Shot, film: Squares, x: 
     return Nodes(mi.Float(m.real), mi.Float(m.imag), mi.Float(m.error), si.t, shape, mi.Float(m.clearance) / pixel)
 
 
-def _placed(film: Squares, place: Any, first: Any, receivers: Receivers) -> Receivers:
-    """Receivers at places of the film with their blocks: of those that the camera itself sees."""
-    placed = film.placed(place.x, place.y, receivers)
-    return placed._replace(block=dr.select(first, placed.block, OUTSIDE))
+def _sample(shot: Shot, pixel: Any, sample: Any) -> tuple[Stream, Any]:
+    """The random numbers of samples of pixels, and where they lie on the film [pixels], by the first two."""
+    identity = mi.sample_tea_32(dr.opaque(mi.UInt32, shot.seed), pixel * dr.opaque(mi.UInt32, shot.spp) + sample)
+    stream = Stream(mi.PCG32(initstate=mi.UInt64(identity[0]), initseq=mi.UInt64(identity[1])))
+    column, row = pixel % dr.opaque(mi.UInt32, shot.width), pixel // dr.opaque(mi.UInt32, shot.width)
+    return stream, mi.Point2f(mi.Float(column), mi.Float(row)) + stream.next_2d()
+
+
+class Samples(NamedTuple):
+    """M at all samples of some pixels of a tile."""
+
+    rank: Any  # of a pixel among them, OUTSIDE if it is none of them
+    real: Any
+    imag: Any
+    error: Any
+
+    def at(self, pixel: Any, index: Any, spp: int, active: Any) -> Known:
+        """M at samples of the tile's pixels."""
+        rank = dr.gather(mi.UInt32, self.rank, pixel, active)
+        holds = active & (rank != OUTSIDE)
+        place = rank * dr.opaque(mi.UInt32, spp) + (index - pixel * dr.opaque(mi.UInt32, spp))
+        return Known(*(dr.gather(mi.Float64, values, place, holds) for values in self[1:]), holds)
+
+
+def _at_samples(
+    light: Light, ask: Ask, sensor: Any, shot: Shot, first: int, pixels: int, cells: Cells
+) -> Samples:
+    """M at the samples of the pixels that no cell serves, asked together."""
+    rank = dr.full(mi.UInt32, OUTSIDE, pixels)
+    every = dr.opaque(mi.UInt32, first) + dr.arange(mi.UInt32, pixels)
+    width = dr.opaque(mi.UInt32, shot.width)
+    own: Any = dr.compress(~cells.knows(every % width, every // width))
+    if len(own) == 0:
+        none = dr.zeros(mi.Float64, 1)
+        return Samples(rank, none, none, none)
+    dr.scatter(rank, dr.arange(mi.UInt32, len(own)), own)
+    index = dr.arange(mi.UInt32, len(own) * shot.spp)
+    of = index // dr.opaque(mi.UInt32, shot.spp)
+    pixel = dr.opaque(mi.UInt32, first) + dr.gather(mi.UInt32, own, of)
+    _, film = _sample(shot, pixel, index - of * dr.opaque(mi.UInt32, shot.spp))
+    (_, receivers, _), _ = _sight(light, sensor, shot, film.x, film.y)
+    m = ask(film.x, film.y, receivers)
+    return Samples(rank, m.real, m.imag, m.error)
 
 
 def render_tile(light: Light, sensor: Any, shot: Shot, first: int, pixels: int, band: Band | None = None) -> Tile:
     """Trace the samples of `pixels` pixels from `first` on; without a band M is asked for at every sample."""
     scene = light.scene.mitsuba
     index = dr.arange(mi.UInt32, pixels * shot.spp)
-    pixel = dr.opaque(mi.UInt32, first) + index // dr.opaque(mi.UInt32, shot.spp)
-    sample = index % dr.opaque(mi.UInt32, shot.spp)
-    identity = mi.sample_tea_32(dr.opaque(mi.UInt32, shot.seed), pixel * dr.opaque(mi.UInt32, shot.spp) + sample)
-    stream = Stream(mi.PCG32(initstate=mi.UInt64(identity[0]), initseq=mi.UInt64(identity[1])))
-
-    column, row = pixel % dr.opaque(mi.UInt32, shot.width), pixel // dr.opaque(mi.UInt32, shot.width)
-    film = mi.Point2f(mi.Float(column), mi.Float(row)) + stream.next_2d()
+    pixel = index // dr.opaque(mi.UInt32, shot.spp)
+    stream, film = _sample(shot, dr.opaque(mi.UInt32, first) + pixel, index % dr.opaque(mi.UInt32, shot.spp))
     place = film / mi.Point2f(dr.opaque(mi.Float, shot.width), dr.opaque(mi.Float, shot.height))
+    band = band or Band(0, shot.height, (), ())
+    ways = zip(band.asks, band.cells, strict=True)
+    single = [_at_samples(light, ask, sensor, shot, first, pixels, m) for ask, m in ways]
     time = sensor.shutter_open()
     if sensor.shutter_open_time() > 0:
         time += stream.next_1d() * sensor.shutter_open_time()
@@ -159,14 +196,17 @@ def render_tile(light: Light, sensor: Any, shot: Shot, first: int, pixels: int, 
 
     def reflected(ray: Any, si: Any, bsdf: Any, n: Any, active: Any, first: Any) -> Reflected:
         known = []
-        for m in () if band is None else band.cells:
+        for m, samples in zip(band.cells, single, strict=True):
             shape: Any = dr.reinterpret_array(mi.UInt32, si.shape)
             found = m.at(film.x, film.y, si.t, shape, active & first)
-            known.append((Factor(found.real, found.imag, found.error), found.holds))
-        if band is None or band.squares is None:
-            return light.reflected(ray, si, bsdf, n, active, known)
-        placed = partial(_placed, band.squares, film, first)
-        return band.light.reflected(ray, si, bsdf, n, active, known, placed)
+            own = samples.at(pixel, index, shot.spp, active & first)
+            known.append(
+                (
+                    Factor(*(dr.select(own.holds, a, b) for a, b in zip(own[:3], found[:3], strict=True))),
+                    found.holds | own.holds,
+                )
+            )
+        return light.reflected(ray, si, bsdf, n, active, known)
 
     path = trace(
         scene,

@@ -1,0 +1,47 @@
+"""M asked at many receivers at once: those that lie in blocks by what acts on these, the others together."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+import drjit as dr
+import mitsuba
+
+from grimaldi.diffraction.model import OUTSIDE, Evaluate, Factor, Grouped, Receivers
+from grimaldi.engine.blocks import Squares
+
+mi: Any = mitsuba  # the stubs refuse numbers where arrays are asked for
+
+Ask = Callable[[Any, Any, Receivers], Factor]
+"""ask(x, y, receivers): M at receivers that are seen at places of the film [pixels], Float64, evaluated."""
+
+
+def ask(film: Squares, factor: Evaluate) -> Ask:
+    """How to ask a model for M at what a camera sees."""
+    if not isinstance(factor, Grouped):
+        return lambda x, y, receivers: _evaluated(factor, receivers)  # noqa: ARG005
+    return partial(_by_blocks, film, factor.among(film.blocks), factor)
+
+
+def _by_blocks(film: Squares, listed: Evaluate, whole: Evaluate, x: Any, y: Any, receivers: Receivers) -> Factor:
+    """Where a receiver among many lies in no block, all would wait for it: those are asked by themselves."""
+    placed = film.placed(x, y, receivers)
+    outside = receivers.active & (placed.block == OUTSIDE)
+    m = _evaluated(listed, placed)
+    left: Any = dr.compress(outside)
+    if len(left) == 0:
+        return m
+    p, n = (dr.gather(type(v), v, left) for v in (receivers.p, receivers.n))
+    own = _evaluated(whole, Receivers(p, n, mi.Bool(True)))
+    for values, of_own in zip(m, own, strict=True):
+        dr.scatter(values, of_own, left)
+    return m
+
+
+def _evaluated(evaluate: Evaluate, receivers: Receivers) -> Factor:
+    """M as arrays of numbers."""
+    m = Factor(*(mi.Float64(v) for v in evaluate(receivers)))
+    dr.eval(*m, *receivers)
+    return m
