@@ -224,10 +224,6 @@ class Walk(Protocol):
         """The piece at a place, whether to take it, and whether to go into what the place stands for."""
         ...
 
-    def asks(self, i: Any) -> Any:
-        """Whether it is not known that the piece reaches the receiver."""
-        ...
-
     def after(self, i: Any, inside: Any) -> Any:
         """The next place."""
         ...
@@ -256,9 +252,6 @@ class Everywhere(NamedTuple):
         d2 = dr.squared_norm(x) - dr.square(dr.dot(x, fr.a))
         whole = (item < tab.n_pieces) | ((item != NONE) & (dr.square(radius) < dr.square(tab.angle) * d2))
         return item, inside & whole, inside & ~whole
-
-    def asks(self, i: Any) -> Any:  # noqa: ARG002
-        return dr.mask_t(self.table.types.Float)(True)
 
     def after(self, i: Any, inside: Any) -> Any:
         return self.table.tree.after(i, inside)
@@ -318,7 +311,7 @@ def body_sum(
             past_real, past_imag = F(0), F(0)
             if dr.hint(probe is not None, mode="scalar"):
                 assert probe is not None
-                tested = acts & walk.asks(i)
+                tested = dr.mask_t(F)(acts)
                 if dr.hint(share > 0, mode="scalar"):
                     left = cut_off(fr, piece, k)
                     tested &= left > share

@@ -32,7 +32,7 @@ from grimaldi.scene.model import Vector
 
 FEW = 64  # chords, that take no hierarchy
 FAINT = 0.01  # |M| of a wave that is not worth a second edge
-FAINTER = 0.03  # of the tolerance: likewise, at loose ones
+FAINTER = 0.2  # of the tolerance: likewise, at loose ones
 WIDEST = 1 / (2**0.5 * np.pi * FAINT)  # Fresnel parameter beyond which E is fainter
 
 

@@ -70,6 +70,10 @@ class Lists(NamedTuple):
     left: Any
     beside: Near | None  # the bodies whose silhouettes pass closest by each
 
+    def verdict(self, i: Any, bit: Any) -> Any:
+        """A bit of what is known of a piece to be tested."""
+        return ((dr.gather(mi.UInt32, self.verdicts, i) >> bit) & 1) != 0
+
     def near(self, receivers: Receivers, silhouettes: Chords | None) -> Near | None:
         """The bodies beside the receivers' blocks."""
         if self.beside is None or silhouettes is None:
@@ -87,22 +91,14 @@ class Listed(NamedTuple):
         return self.lists.tested.bounds(receivers.block, receivers.active)
 
     def visit(self, fr: Frame, i: Any) -> tuple[Any, Any, Any]:  # noqa: ARG002
-        open_, ask = self._verdict(i)
-        return self.lists.tested.item(i), open_ | ask, open_ | ask
-
-    def asks(self, i: Any) -> Any:
-        return self._verdict(i)[1]
+        ask = self.lists.verdict(i, self.cell + CELLS)
+        return self.lists.tested.item(i), ask, ask
 
     def after(self, i: Any, inside: Any) -> Any:  # noqa: ARG002
         return i + 1
 
     def weight(self, fr: Frame, piece: Piece) -> Any:  # noqa: ARG002
         return type(fr.z2)(1)
-
-    def _verdict(self, i: Any) -> tuple[Any, Any]:
-        """Whether a piece reaches all of the receivers' cells, and whether it may reach part of them."""
-        bits = dr.gather(mi.UInt32, self.lists.verdicts, i) >> self.cell
-        return (bits & 1) != 0, (bits & (1 << CELLS)) != 0
 
 
 class _Seen(NamedTuple):
@@ -274,9 +270,9 @@ def _verdicts(
         for x in range(ACROSS):
             corners = sum(1 << ((y + dy) * side + x + dx) for dy in (0, 1) for dx in (0, 1))
             cell = 1 << (y * ACROSS + x)
-            same = (members & corners) == corners
-            whole |= dr.select(same & ((bits & corners) == corners), cell, 0)
-            none |= dr.select(same & ((bits & corners) == 0), cell, 0)
+            of = members & corners
+            whole |= dr.select((of != 0) & ((bits & of) == of), cell, 0)
+            none |= dr.select((of != 0) & ((bits & of) == 0), cell, 0)
     verdict = whole | ((~(whole | none) & (ALL >> CELLS)) << CELLS)
     dr.scatter(found, dr.select(dr.gather(mi.Bool, passes, pair), ALL, verdict), pair)
     dr.eval(found)
@@ -306,6 +302,18 @@ def listed_sum(
     real, imag, err_real, err_imag, rounding2 = sums[:5]
     nearest2, nearest_segment, receiver2 = F(nearest.distance2), U(nearest.segment), F(margins.receiver2)
     active, block = receivers.active, receivers.block
+    i, end = found.tested.bounds(block, active)
+    while active & (i < end):
+        whole = active & found.verdict(i, receivers.cell)
+        if whole:
+            chain = chain_wave(fr, tab, *tab.range(found.tested.item(i)), k, rule, None, False, whole)
+            real, imag = real + chain.wave.real, imag + chain.wave.imag
+            err_real, err_imag = err_real + chain.wave.err_real, err_imag + chain.wave.err_imag
+            rounding2 += chain.wave.rounding2
+            receiver2 = dr.minimum(receiver2, chain.receiver2)
+            nearest_segment = dr.select(chain.distance2 < nearest2, chain.segment, nearest_segment)
+            nearest2 = dr.minimum(nearest2, chain.distance2)
+        i += 1
     i, end = found.first.bounds(block, active)
     while active & (i < end):
         chain = chain_wave(fr, tab, found.first.item(i), found.last.item(i) + 1, k, rule, None, False, active)

@@ -17,6 +17,8 @@ from typing import Any, NamedTuple
 import drjit as dr
 import mitsuba
 
+from grimaldi.diffraction.model import ACROSS
+
 mi: Any = mitsuba  # the stubs refuse numbers where arrays are asked for
 
 LARGEST = 16  # pixels across the largest cells
@@ -99,14 +101,17 @@ class _Grid(NamedTuple):
     top: Any
 
     def square_by_square(self, rows: int) -> tuple[Any, Any]:
-        """All nodes' indices, those of a square of the largest cells' size together, and which of them there are."""
+        """All nodes' indices, those of a block together, and in it those of a patch, and which of them there are."""
         side = 2 * LARGEST >> self.shift
         across = (self.columns + (side - 1)) // side
         down = -(-rows // side)
         index = dr.arange(mi.UInt32, int(across[0]) * down * side * side)
         square, within = index // (side * side), index % (side * side)
-        column = (square % across) * side + within % side
-        row = (square // across) * side + within // side
+        part = max(side // ACROSS, 1)
+        patch, place = within // (part * part), within % (part * part)
+        patches = side // part
+        column = (square % across) * side + (patch % patches) * part + place % part
+        row = (square // across) * side + (patch // patches) * part + place // part
         return row * self.columns + column, (row < rows) & (column < self.columns)
 
     def node(self, x: Any, y: Any, size: Any, m: int, n: int) -> Any:
