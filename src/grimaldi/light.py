@@ -28,7 +28,7 @@ from grimaldi.propagate import Wave, carrier, factor
 from grimaldi.scene.bodies import indices, vertices
 from grimaldi.scene.model import Mesh, Scene, Source
 
-INTERPOLATED = 0.3  # of the tolerance: what pictures may leave to interpolation of M over the film
+INTERPOLATED = 0.1  # of the tolerance: what pictures may leave to interpolation of M over the film
 
 
 @dataclass(frozen=True)

@@ -20,12 +20,12 @@ from grimaldi.diffraction.curves import curve_error
 from grimaldi.diffraction.edges import Everywhere, Margins, Sum, body_sum, lit_share, planar_sum
 from grimaldi.diffraction.frame import Frame, frame
 from grimaldi.diffraction.grazing import chords, near
-from grimaldi.diffraction.lists import Listed, Lists, listed_sum, lists
+from grimaldi.diffraction.lists import Listed, Lists, Search, listed_sum, lists
 from grimaldi.diffraction.model import OUTSIDE, Blocks, Evaluate, Factor, Grouped, Options, Receivers
 from grimaldi.diffraction.occlusion import Rays, rays
 from grimaldi.diffraction.screen import beyond
 from grimaldi.diffraction.segment import Rule
-from grimaldi.diffraction.table import Table, coarseness, needs_double, table
+from grimaldi.diffraction.table import Table, needs_double, table
 from grimaldi.outlines.model import Outline
 from grimaldi.outlines.silhouettes import silhouettes
 from grimaldi.scene.model import Scene, Source
@@ -82,6 +82,11 @@ class _Either(NamedTuple):
 
     def __call__(self, receivers: Receivers) -> Factor:
         return _in_either(self.single, self.double, self.tolerance, receivers)
+
+    @property
+    def items(self) -> int:
+        """The number of pieces that there are lists of."""
+        return self.single.items if isinstance(self.single, _Bodies) else 0
 
     def among(self, blocks: Blocks) -> Evaluate:
         """By the same lists in both."""
@@ -171,7 +176,9 @@ def unoccluded(problem: Problem, precision: Types, far: Any) -> Callable[[Any], 
     def evaluate(p: Any) -> tuple[Any, Any]:
         receivers = Receivers(p, dr.zeros(mi.Vector3f, dr.width(p)), dr.mask_t(p.x)(True))
         fr = frame(problem.source, p, tab)
-        sums, _, _ = body_sum(fr, tab, Everywhere(tab), tab.device(problem.k), rule, 0.0, 1.0, None, None, False, receivers)
+        sums, _, _ = body_sum(
+            fr, tab, Everywhere(tab), tab.device(problem.k), rule, 0.0, 1.0, None, None, False, receivers
+        )
         return sums.real / (2 * np.pi), sums.imag / (2 * np.pi)
 
     return evaluate
@@ -190,8 +197,8 @@ class _Bodies:
         self.problem = problem
         self.rule = problem.rule()
         self.rays = rays(scene, source, outline.sag)
-        self.tab = table(outline, source, precision, coarse=coarseness(tolerance), angle=AS_ONE * tolerance)
-        self.share = UNASKED * tolerance / int(self.tab.n_pieces[0])
+        self.tab = table(outline, source, precision, angle=AS_ONE * tolerance)
+        self.share = UNASKED * tolerance / self.items
         self.grazing = None if grazed is None else chords(grazed, self.tab.centre, precision)
 
     def __call__(self, receivers: Receivers, found: Lists | None = None) -> Factor:
@@ -224,6 +231,11 @@ class _Bodies:
         return _factor(tab, rule, fr, k, margins, lit, 1, sums)
 
     @property
+    def items(self) -> int:
+        """The number of pieces."""
+        return int(self.tab.n_pieces[0])
+
+    @property
     def probe(self) -> Rays | None:
         """What blocks X→P."""
         return self.rays if self.problem.options.occlusion != "none" else None
@@ -239,7 +251,5 @@ class _Bodies:
         tab, corners = self.tab, self.rule.corners
         if corners is None or options.rim == "smooth":
             return None
-        k = tab.device(k)
-        return lists(source, tab, k, corners, options.tolerance, self.share, self.probe, self.grazing, blocks)
-
-
+        search = Search(source, tab, tab.device(k), corners, options.tolerance, self.share, self.probe, self.grazing)
+        return lists(search, blocks)

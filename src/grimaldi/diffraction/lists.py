@@ -39,15 +39,14 @@ class List(NamedTuple):
     items: Any
 
     @staticmethod
-    def of(chosen: Any, items: Any, each: int) -> List:
-        """The items of those that are `chosen`, `each` a block."""
-        index = dr.compress(chosen)
+    def of(chosen: Any, block: Any, blocks: int, items: Any) -> List:
+        """The `chosen` of items, which lie in order of their blocks."""
+        count = dr.zeros(mi.UInt32, blocks + 1)
+        dr.scatter_add(count, mi.UInt32(1), block + 1, chosen)
+        index: Any = dr.compress(chosen)
         if len(index) == 0:
             index = dr.zeros(mi.UInt32, 1)  # an array that nothing can be gathered from stops a kernel
-        count = dr.block_sum(dr.select(chosen, mi.UInt32(1), 0), each)
-        begin = dr.zeros(mi.UInt32, len(count) + 1)
-        dr.scatter(begin, dr.cumsum(count), dr.arange(mi.UInt32, len(count)) + 1)
-        return List(begin, dr.gather(type(items), items, index))
+        return List(dr.cumsum(count), dr.gather(type(items), items, index))
 
     def item(self, i: Any) -> Any:
         """What stands at a place."""
@@ -101,49 +100,179 @@ class Listed(NamedTuple):
         return type(fr.z2)(1)
 
 
-class _Seen(NamedTuple):
-    """A piece from the middle of a block."""
+class Search(NamedTuple):
+    """What is asked of pieces: the outlines, in Float32 or Float64, and what is allowed to be left out of M.
 
-    sounds: Any
-    clear: Any
-    near: Any  # whether it may act somewhere in the block
+    share: |M| below which a piece reaches all without a test; probe: rays X→P, None where nothing blocks them; grazing:
+    silhouettes that X→P may graze.
+    """
+
+    source: Source
+    tab: Table
+    k: Any
+    rule: Corners
+    tolerance: float
+    share: float
+    probe: Rays | None
+    grazing: Chords | None
+
+
+class _Pairs(NamedTuple):
+    """Blocks and pieces, each of which may act in the other."""
+
+    block: Any
+    piece: Any
+    index: Any  # of the pair among all
+
+
+class _Seen(NamedTuple):
+    """Pieces from the middles of blocks."""
+
+    open: Any  # whether it acts there
     far: Any  # whether leading terms serve everywhere in the block
     inner2: Any  # sum of squares of what its inner corners send
     start: Any  # C φ'/ψ' at its ends
     stop: Any
-    grazed: Any  # whether the way to the block passes another body's silhouette
+    passes: Any  # whether the way to the block grazes another body's silhouette
+
+
+def lists(search: Search, blocks: Blocks) -> Lists:
+    """What acts on each block."""
+    tab, tolerance = search.tab, search.tolerance
+    n, number = int(tab.n_pieces[0]), dr.width(blocks.p)
+    pairs = _pairs(search, blocks, n)
+    beside = _beside(search, blocks)
+    seen = _look(search, blocks, pairs, beside)
+
+    # where a piece reaches this block but not the next in the same plane, it may not reach all of it
+    reached = dr.zeros(mi.Bool, number * n)
+    dr.scatter(reached, seen.open, pairs.index)
+    changes = dr.gather(mi.Float, blocks.bend, pairs.block) > 0
+    for side in blocks.beside:
+        other = dr.gather(mi.UInt32, side, pairs.block) * n + pairs.piece
+        changes |= dr.gather(mi.Bool, reached, other) != seen.open
+    limit = 2 * np.pi * tolerance
+    faint = seen.far & (dr.maximum(dr.abs(seen.start), dr.abs(seen.stop)) < UNTESTED * limit)
+    tested = changes & ~faint | seen.passes
+    dropped = seen.open & ~tested & seen.far & (seen.inner2 < dr.square(CORNER * limit))
+    kept = seen.open & ~tested & ~dropped
+    dr.eval(tested, kept, dropped)
+
+    # runs of neighbours
+    last = len(pairs.index) - 1
+    at = dr.arange(mi.UInt32, last + 1)
+    before, after = dr.maximum(at, 1) - 1, dr.minimum(at + 1, last)
+    follows = dr.gather(mi.Bool, tab.follows, pairs.piece) & (
+        dr.gather(mi.UInt32, pairs.index, before) + 1 == pairs.index
+    )
+    turn = seen.start - dr.gather(mi.Float, seen.stop, before)
+    joint = follows & dropped & dr.gather(mi.Bool, dropped, before) & (dr.abs(turn) < CORNER * limit)
+    along = follows & kept & dr.gather(mi.Bool, kept, before)
+    dr.eval(joint, along)
+    goes_on = (at < last) & dr.gather(mi.Bool, along, after)
+    begins, stops = dropped & ~joint, dropped & ~((at < last) & dr.gather(mi.Bool, joint, after))
+    strong = dr.abs(seen.start) >= CORNER * limit, dr.abs(seen.stop) >= CORNER * limit
+    left2 = dr.select(dropped, seen.inner2, 0) + dr.select(joint, dr.square(turn), 0)
+    left2 += dr.select(begins & ~strong[0], dr.square(seen.start), 0)
+    left2 += dr.select(stops & ~strong[1], dr.square(seen.stop), 0)
+    left = dr.zeros(mi.Float, number)
+    dr.scatter_add(left, left2, pairs.block)
+    first, end = tab.range(pairs.piece)
+    verdicts = _verdicts(search, blocks, pairs, tested, seen.passes)
+    some = verdicts != 0
+    dr.eval(begins, stops, first, end, goes_on, some)
+    return Lists(
+        List.of(some, pairs.block, number, pairs.piece),
+        List.of(some, pairs.block, number, verdicts).items,
+        List.of(kept & ~along, pairs.block, number, first),
+        List.of(kept & ~goes_on, pairs.block, number, end - 1),
+        List.of(begins & strong[0], pairs.block, number, first),
+        List.of(stops & strong[1], pairs.block, number, end - 1),
+        dr.sqrt(left) / (2 * np.pi),
+        beside,
+    )
+
+
+def _pairs(search: Search, blocks: Blocks, n: int) -> _Pairs:
+    """Which of n pieces may act somewhere in a block: within the outlines' reach, and above some horizon."""
+    tab = search.tab
+    index = dr.arange(mi.UInt32, dr.width(blocks.p) * n)
+    block = index // n
+    piece = tab.piece(index - block * n)
+    fr = frame(search.source, dr.gather(type(blocks.p), blocks.p, block), tab)
+    radius = tab.types.Float(dr.gather(mi.Float, blocks.radius, block))
+    bend = tab.types.Float(dr.gather(mi.Float, blocks.bend, block))
+    normal = tab.types.Vector(dr.gather(type(blocks.n), blocks.n, block))
+    d = fr.foot + fr.z2 * fr.a - piece.middle
+    acts = dr.gather(mi.Bool, blocks.active, block)
+    acts &= least_detour(fr, piece.middle, piece.reach + radius) <= tab.far
+    acts &= dr.select(bend == 0, sounds(fr, piece, normal), dr.dot(normal, d) < radius + bend * dr.norm(d))
+    found: Any = dr.compress(acts)
+    if len(found) == 0:
+        found = dr.zeros(mi.UInt32, 1)  # one more than needed does no harm
+    block = found // n
+    dr.eval(found, block)
+    return _Pairs(block, found - block * n, found)
+
+
+def _beside(search: Search, blocks: Blocks) -> Near | None:
+    """The bodies whose silhouettes rays to each block pass closest by."""
+    if search.grazing is None:
+        return None
+    middle = Receivers(blocks.p, blocks.n, blocks.active)
+    fr = frame(search.source, blocks.p, search.tab)
+    found = near(fr, search.grazing, search.k, middle, search.tab.types.Float(blocks.radius))
+    dr.eval(found.body, found.v2, found.next_body, found.next_v2)
+    return found
+
+
+def _look(search: Search, blocks: Blocks, pairs: _Pairs, beside: Near | None) -> _Seen:
+    """Each piece from the middle of its block."""
+    V = search.tab.types.Vector
+    p = dr.gather(type(blocks.p), blocks.p, pairs.block)
+    normal = dr.gather(type(blocks.n), blocks.n, pairs.block)
+    radius = search.tab.types.Float(dr.gather(mi.Float, blocks.radius, pairs.block))
+    x = mi.Point3f(p)
+    if search.probe is not None:
+        x = x + search.probe.epsilon(x) * normal
+    by = None
+    if beside is not None and search.grazing is not None:
+        by = beside.of(pairs.block, mi.Bool(True), search.grazing)
+    fr = frame(search.source, p, search.tab)
+    open_, far, inner2, start, stop, passes = _from_middle(search, fr, pairs.piece, x, V(normal), radius, by)
+    seen = _Seen(open_, far, mi.Float(inner2), mi.Float(start), mi.Float(stop), passes)
+    dr.eval(*seen)
+    return seen
 
 
 @dr.syntax
-def _seen(
-    fr: Frame, tab: Table, i: Any, k: Any, rule: Corners, share: float, probe: Rays | None, p: Any, n: Any, radius: Any, bend: Any,
-    beside: Near | None, tolerance: float
+def _from_middle(
+    search: Search, fr: Frame, i: Any, p: Any, n: Any, radius: Any, beside: Near | None
 ) -> tuple[Any, ...]:
+    """What is in `_Seen`, along pieces i, for receivers within `radius` of P."""
+    tab, k, probe = search.tab, search.k, search.probe
     F = tab.types.Float
     U = dr.uint32_array_t(F)
     piece = tab.piece(i)
-    near = least_detour(fr, piece.middle, piece.reach + radius) <= tab.far
-    d = fr.foot + fr.z2 * fr.a - piece.middle
-    near &= (bend == 0) | (dr.dot(n, d) < radius + bend * dr.norm(d))  # what may rise above a receiver's horizon
-    acts = near & sounds(fr, piece, n)
+    acts = sounds(fr, piece, n)
     clear = dr.mask_t(F)(acts)
     if dr.hint(probe is not None, mode="scalar"):
         assert probe is not None
-        tested = acts & (cut_off(fr, piece, k) > share)
+        tested = acts & (cut_off(fr, piece, k) > search.share)
         if tested:
             x = mi.Point3f(piece.middle + constant(tab.types.Vector, tab.centre))
             clear = acts & probe.reaches(x, piece, p, tested)
-    far = dr.mask_t(F)(near)
+    far = dr.mask_t(F)(True)
     inner2, start, stop = F(0), F(0), F(0)
     j = U(piece.first)
     last = tuple(corner(fr, tab.corner(j, 0), k))
-    while near & (j < piece.end):
+    while j < piece.end:
         a, b = Corner(*last), corner(fr, tab.corner(j, 1), k)
         at = slopes(fr.a, a, b, k)
         margin = k * radius * dr.sqrt(at.length2) * dr.rsqrt(dr.minimum(a.to_p2, b.to_p2))
         least = dr.minimum(dr.abs(at.a), dr.abs(at.b)) - margin
         far &= (at.a * at.b > 0) & (least > 0) & (dr.minimum(a.d2, b.d2) > 4 * dr.square(radius))
-        far &= dr.square(least) > 2 * rule.far * k * at.length2 * dr.maximum(a.inv, b.inv)
+        far &= dr.square(least) > 2 * search.rule.far * k * at.length2 * dr.maximum(a.inv, b.inv)
         end_a, end_b = at.turn * a.C / (a.d2 * at.a), at.turn * b.C / (b.d2 * at.b)
         begins = j == piece.first
         inner2 += dr.select(begins, 0, dr.square(end_a - stop))
@@ -155,122 +284,34 @@ def _seen(
     if dr.hint(beside is not None, mode="scalar"):
         assert beside is not None
         _, v2, close = other_than(beside, piece)
-        if near & close:
-            passes = worth(cut_off(fr, piece, k), v2, tolerance)
-    return acts, clear, near, far, inner2, start, stop, passes
+        if close:
+            passes = worth(cut_off(fr, piece, k), v2, search.tolerance)
+    return clear, far, inner2, start, stop, passes
 
 
-def lists(
-    source: Source, tab: Table, k: Any, rule: Corners, tolerance: float, share: float, probe: Rays | None, grazing: Chords | None, blocks: Blocks
-) -> Lists:
-    """What acts on each block.
-
-    share: |M| below which a piece reaches all without a test; probe: rays X→P, None where nothing blocks them.
-    """
-    n = int(tab.n_pieces[0])
-    each = dr.opaque(mi.UInt32, n)
-    index = dr.arange(mi.UInt32, dr.width(blocks.p) * n)
-    block = index // each
-    i = index - block * each
-    p = dr.gather(type(blocks.p), blocks.p, block)
-    normal = dr.gather(type(blocks.n), blocks.n, block)
-    radius = tab.types.Float(dr.gather(type(blocks.radius), blocks.radius, block))
-    bend = dr.gather(type(blocks.bend), blocks.bend, block)
-    active = dr.gather(type(blocks.active), blocks.active, block)
-    x = mi.Point3f(p)
-    if probe is not None:
-        x = x + probe.epsilon(x) * normal
-    fr = frame(source, p, tab)
-    beside = None
-    if grazing is not None:
-        r = tab.types.Float(blocks.radius)
-        middle = Receivers(blocks.p, blocks.n, blocks.active)
-        beside = near(frame(source, blocks.p, tab), grazing, k, middle, r)
-        dr.eval(beside.body, beside.v2, beside.next_body, beside.next_v2)
-    seen = _Seen(
-        *_seen(
-            fr, tab, i, k, rule, share, probe, x, tab.types.Vector(normal), radius,
-            tab.types.Float(bend), None if beside is None or grazing is None else beside.of(block, active, grazing), tolerance
-        )
-    )
-    limit = 2 * np.pi * tolerance
-    inner2 = mi.Float(seen.inner2)
-    start, stop = mi.Float(seen.start), mi.Float(seen.stop)
-    open_ = active & seen.sounds & seen.clear
-    heard = active & seen.near
-    far = heard & seen.far
-    passes = heard & seen.grazed
-    dr.eval(open_, heard, far, inner2, start, stop, bend, passes)
-
-    changes = bend > 0
-    for side in blocks.beside:
-        other = dr.gather(mi.UInt32, side, block) * each + i
-        changes |= dr.gather(mi.Bool, open_, other) != open_
-    faint = far & (dr.maximum(dr.abs(start), dr.abs(stop)) < UNTESTED * limit)
-    tested = heard & (changes & ~faint | passes)
-    open_ = open_ & ~tested
-    dropped = open_ & far & (inner2 < dr.square(CORNER * limit))
-    kept = open_ & ~dropped
-    dr.eval(tested, kept, dropped)
-
-    follows = dr.gather(mi.Bool, tab.follows, i)
-    before = dr.maximum(index, 1) - 1
-    corner_ = start - dr.gather(mi.Float, stop, before)
-    joint = follows & dropped & dr.gather(mi.Bool, dropped, before) & (dr.abs(corner_) < CORNER * limit)
-    along = follows & kept & dr.gather(mi.Bool, kept, before)
-    dr.eval(joint, along)
-    after = dr.minimum(index + 1, dr.width(index) - 1)
-    ends = index + 1 < dr.width(index)
-    joint_after = ends & dr.gather(mi.Bool, joint, after)
-    along_after = ends & dr.gather(mi.Bool, along, after)
-    begins, stops = dropped & ~joint, dropped & ~joint_after
-    out_start, out_stop = dr.abs(start) < CORNER * limit, dr.abs(stop) < CORNER * limit
-    left2 = dr.select(dropped, inner2, 0) + dr.select(joint, dr.square(corner_), 0)
-    left2 += dr.select(begins & out_start, dr.square(start), 0) + dr.select(stops & out_stop, dr.square(stop), 0)
-    first = dr.gather(mi.UInt32, tab.ranges, 2 * i)
-    last = dr.gather(mi.UInt32, tab.ranges, 2 * i + 1) - 1
-    left = dr.sqrt(dr.block_sum(left2, n)) / (2 * np.pi)
-    dr.eval(begins, stops, left, first, last)
-    verdicts = _verdicts(source, tab, probe, blocks, tested, passes, n)
-    reaches = verdicts != 0
-    return Lists(
-        List.of(reaches, i, n),
-        List.of(reaches, verdicts, n).items,
-        List.of(kept & ~along, first, n),
-        List.of(kept & ~along_after, last, n),
-        List.of(begins & ~out_start, first, n),
-        List.of(stops & ~out_stop, last, n),
-        left,
-        beside,
-    )
-
-
-def _verdicts(
-    source: Source, tab: Table, probe: Rays | None, blocks: Blocks, tested: Any, passes: Any, n: int
-) -> Any:
+def _verdicts(search: Search, blocks: Blocks, pairs: _Pairs, tested: Any, passes: Any) -> Any:
     """Which cells of blocks pieces reach, of those that are `tested`: by a ray to each corner of the cells.
 
-    Where corners differ, or lie on another surface, the cell is to be asked, and all of them for what `passes` others.
+    Where the corners that lie on the block's surface differ, the cell is to be asked, and all of them for what `passes`
+    other silhouettes.
     """
     found = dr.zeros(mi.UInt32, len(tested))
-    pair = dr.compress(tested)
-    if probe is None or len(pair) == 0:
+    pair: Any = dr.compress(tested)
+    if search.probe is None or len(pair) == 0:
         dr.scatter(found, mi.UInt32(ALL), pair)
         return found
     side = ACROSS + 1
     index = dr.arange(mi.UInt32, len(pair) * side * side)
     entry = index // (side * side)
     place = index - entry * (side * side)
-    of = dr.gather(mi.UInt32, pair, entry)
-    reached = _reached(source, tab, probe, blocks, of // n, place, of % n)
+    reached = _reached(search, search.probe, blocks, pairs, dr.gather(mi.UInt32, pair, entry), place)
     bits = dr.block_sum(dr.select(reached, mi.UInt32(1) << place, 0), side * side)
-    members = dr.gather(mi.UInt32, blocks.members, pair // n)
+    members = dr.gather(mi.UInt32, blocks.members, dr.gather(mi.UInt32, pairs.block, pair))
     whole, none = mi.UInt32(0), mi.UInt32(0)
     for y in range(ACROSS):
         for x in range(ACROSS):
-            corners = sum(1 << ((y + dy) * side + x + dx) for dy in (0, 1) for dx in (0, 1))
             cell = 1 << (y * ACROSS + x)
-            of = members & corners
+            of = members & sum(1 << ((y + dy) * side + x + dx) for dy in (0, 1) for dx in (0, 1))
             whole |= dr.select((of != 0) & ((bits & of) == of), cell, 0)
             none |= dr.select((of != 0) & ((bits & of) == 0), cell, 0)
     verdict = whole | ((~(whole | none) & (ALL >> CELLS)) << CELLS)
@@ -279,13 +320,14 @@ def _verdicts(
     return found
 
 
-def _reached(source: Source, tab: Table, probe: Rays, blocks: Blocks, of: Any, place: Any, i: Any) -> Any:
+def _reached(search: Search, probe: Rays, blocks: Blocks, pairs: _Pairs, pair: Any, place: Any) -> Any:
     """Whether pieces reach corners of cells of blocks."""
-    at = of * (ACROSS + 1) ** 2 + place
+    tab = search.tab
+    at = dr.gather(mi.UInt32, pairs.block, pair) * (ACROSS + 1) ** 2 + place
     p = dr.gather(type(blocks.lattice), blocks.lattice, at)
     n = dr.gather(type(blocks.normals), blocks.normals, at)
-    piece = tab.piece(i)
-    acts = sounds(frame(source, p, tab), piece, tab.types.Vector(n))
+    piece = tab.piece(dr.gather(mi.UInt32, pairs.piece, pair))
+    acts = sounds(frame(search.source, p, tab), piece, tab.types.Vector(n))
     x = mi.Point3f(piece.middle + constant(tab.types.Vector, tab.centre))
     q = mi.Point3f(p)
     return acts & probe.reaches(x, piece, q + probe.epsilon(q) * n, acts)

@@ -106,6 +106,11 @@ Evaluate = Callable[[Receivers], Factor]
 class Grouped(Protocol):
     """An `Evaluate` that can be quicker where it knows which receivers lie side by side."""
 
+    @property
+    def items(self) -> int:
+        """What of the outlines is looked at for each block."""
+        ...
+
     def __call__(self, receivers: Receivers) -> Factor: ...
 
     def among(self, blocks: Blocks) -> Evaluate:

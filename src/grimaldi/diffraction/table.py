@@ -14,7 +14,7 @@ from grimaldi.diffraction.model import Options
 from grimaldi.outlines.model import Outline, Reals
 from grimaldi.scene.model import Source, Vector
 
-LONGEST_PIECE = 8  # segments, at a tolerance of 1e-3
+LONGEST_PIECE = 8  # segments
 MANY = 2048  # pieces, that a hierarchy pays for: receivers beside each other go different ways through it
 
 
@@ -100,27 +100,19 @@ class Table(NamedTuple):
         )
 
 
-def coarseness(tolerance: float) -> float:
-    """How much longer pieces may be than at a tolerance of 1e-3 or less: the sides of a step in M grow with it."""
-    return float(np.clip(np.cbrt(tolerance / 1e-3), 1, 4))
-
-
-def cut(outline: Outline, coarse: float = 1.0) -> NDArray[np.int64]:
-    """First segments of the pieces, and the number of segments: runs of a chain, a 64th of a body's extent or less.
-
-    coarse: by what factor pieces may be longer.
-    """
+def cut(outline: Outline) -> NDArray[np.int64]:
+    """First segments of the pieces, and the number of segments: runs of a chain, a 64th of a body's extent or less."""
     bodies, of = np.unique(outline.body, return_inverse=True)
     low, high = (np.full((len(bodies), 3), sign * np.inf) for sign in (1, -1))
     np.minimum.at(low, of, outline.start)
     np.maximum.at(high, of, outline.start)
-    most = (coarse / 64 * np.linalg.norm(high - low, axis=1))[of]
+    most = (1 / 64 * np.linalg.norm(high - low, axis=1))[of]
     lengths = np.linalg.norm(outline.end - outline.start, axis=1)
     inner = np.isfinite(outline.behind)
     new = np.append(True, (outline.chain[1:] != outline.chain[:-1]) | (inner[1:] != inner[:-1]))
     first, in_piece, total = [], 0, 0.0
     for i, (begins, length, longest) in enumerate(zip(new.tolist(), lengths.tolist(), most.tolist(), strict=True)):
-        if begins or in_piece >= coarse * LONGEST_PIECE or total + length > longest:
+        if begins or in_piece >= LONGEST_PIECE or total + length > longest:
             first.append(i)
             in_piece, total = 0, 0.0
         in_piece += 1
@@ -144,7 +136,6 @@ def table(
     source: Source,
     types: Types,
     ranges: NDArray[np.int64] | None = None,
-    coarse: float = 1.0,
     angle: float = 0.0,
 ) -> Table:
     """Pack what a source sees; its pieces begin at the segments `ranges`, the last of which is their number (`cut`)."""
@@ -158,7 +149,7 @@ def table(
     zero = np.zeros_like(length)
     segments = np.concatenate([X0, length, X1, zero, (X1 - X0) / length, outline.radius[:, None]], 1)
     if ranges is None:
-        ranges = cut(outline, coarse)
+        ranges = cut(outline)
     plan, runs, item = (_plan if np.isfinite(outline.far) else _pieces_alone)(outline, X0, X1, ranges)
     first, end = runs.T
     middle = (first + end) // 2

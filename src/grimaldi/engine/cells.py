@@ -26,7 +26,7 @@ HALVED = 0.25  # what halving a cell leaves of a quadratic's error, at most
 AT_BEST = 1 / 16  # what it leaves of it at best: an eighth of a cubic's, less in quarters where M is straighter
 STRAIGHT = 0.5  # what a quadratic leaves of a bilinear function's error, at most
 SIMPSON = 1 / 6, 4 / 6, 1 / 6  # means of quadratics
-IN_PIXEL = 10  # times a mean's error, that M may be off by within a pixel
+IN_PIXEL = 3  # times a mean's error, that M may be off by within a pixel
 DEPTH = 1e-4  # of the distance from the camera, that a surface may lie off the cell's
 
 
@@ -172,9 +172,7 @@ def cells(evaluate: Evaluate, width: int, top: int, rows: int, finest: int, shar
     return _by_pixel(nodes, grid, levels, across * LARGEST, down * LARGEST)
 
 
-def _fill(
-    nodes: _Nodes, grid: _Grid, order: tuple[Any, Any], x: Any, y: Any, size: int, evaluate: Evaluate
-) -> None:
+def _fill(nodes: _Nodes, grid: _Grid, order: tuple[Any, Any], x: Any, y: Any, size: int, evaluate: Evaluate) -> None:
     """Ask for M at the nodes of cells that are not there yet, neighbours together: they are quicker so."""
     asked = dr.zeros(mi.Bool, len(nodes.there))
     for n in range(3):

@@ -16,7 +16,7 @@ import mitsuba
 import numpy as np
 from numpy.typing import NDArray
 
-from grimaldi.diffraction.model import OUTSIDE, Factor, Receivers
+from grimaldi.diffraction.model import OUTSIDE, Factor, Grouped, Receivers
 from grimaldi.engine.asking import Ask, ask
 from grimaldi.engine.blocks import Sight, squares
 from grimaldi.engine.cells import LARGEST, Cells, Known, Nodes, cells
@@ -27,6 +27,7 @@ mi: Any = mitsuba  # the stubs refuse numbers where arrays are asked for
 
 ASKED = 1 << 19  # rays of a tile at whose ends the model is asked for M: a few seconds of work
 RAYS = 1 << 21  # of a tile in all: some hundred bytes each
+PAIRS = 1 << 27  # of blocks of a band and what is looked at for them
 NODES = 1 << 23  # of the cells of a band of the film: some twenty bytes each
 
 
@@ -87,11 +88,10 @@ def bands(light: Light, sensor: Any, shot: Shot) -> Iterator[Band]:
     if light.interpolated == 0 or sensor.needs_aperture_sample():
         yield Band(0, shot.height, (), ())
         return
-    finest = (
-        1 if shot.spp >= 8 else 2 if shot.spp >= 2 else 4
-    )  # a cell of the finest asks no more than its pixels would
-    row = len(light.beams) * LARGEST * shot.width * (2 / finest) ** 2
-    step = LARGEST * max(int(NODES / row), 1)
+    finest = 1 if shot.spp >= 8 else 2 if shot.spp >= 2 else 4  # a finer cell asks no less than its pixels would
+    row = len(light.beams) * LARGEST * shot.width * (2 / finest) ** 2 / NODES
+    items = max((beam.factor.items for beam in light.beams if isinstance(beam.factor, Grouped)), default=0)
+    step = LARGEST * max(int(1 / max(row, items * shot.width / (LARGEST * PAIRS))), 1)
     for top in range(0, shot.height, step):
         rows = min(step, shot.height - top)
         film = squares(lambda x, y: _sight(light, sensor, shot, x, y)[0], shot.width, top, rows)
@@ -157,9 +157,7 @@ class Samples(NamedTuple):
         return Known(*(dr.gather(mi.Float64, values, place, holds) for values in self[1:]), holds)
 
 
-def _at_samples(
-    light: Light, ask: Ask, sensor: Any, shot: Shot, first: int, pixels: int, cells: Cells
-) -> Samples:
+def _at_samples(light: Light, ask: Ask, sensor: Any, shot: Shot, first: int, pixels: int, cells: Cells) -> Samples:
     """M at the samples of the pixels that no cell serves, asked together."""
     rank = dr.full(mi.UInt32, OUTSIDE, pixels)
     every = dr.opaque(mi.UInt32, first) + dr.arange(mi.UInt32, pixels)
