@@ -192,7 +192,7 @@ class _Bodies:
     """Past bodies: of all pieces, or of those on the lists of the receivers' blocks."""
 
     def __init__(self, problem: Problem, precision: Types) -> None:
-        scene, source, outline, k, options, grazed = problem
+        scene, source, outline, _, options, grazed = problem
         tolerance = options.tolerance
         self.problem = problem
         self.rule = problem.rule()

@@ -238,7 +238,7 @@ class Everywhere(NamedTuple):
 
     table: Table
 
-    def bounds(self, receivers: Receivers) -> tuple[Any, Any]:  # noqa: ARG002
+    def bounds(self, receivers: Receivers) -> tuple[Any, Any]:
         U = dr.uint32_array_t(self.table.types.Float)
         return U(0), self.table.tree.size
 
@@ -288,8 +288,8 @@ def body_sum(
 ) -> tuple[Sum, Nearest, Margins]:
     """The sum over the outlines of bodies, piece by piece of a walk, each as far as it reaches the receiver.
 
-    What would add less than `share` of M goes unasked, nothing if that is 0; without a probe all does. Without silhouettes
-    near by a piece reaches the receiver or does not. `smooth` rims are those with a radius.
+    What would add less than `share` of M goes unasked, nothing if that is 0; without a probe all does. Without
+    silhouettes near by a piece reaches the receiver or does not. `smooth` rims are those with a radius.
     """
     F = tab.types.Float
     U = dr.uint32_array_t(F)

@@ -210,4 +210,4 @@ def source_sum(fr: Frame, lamps: Lamps, k: float, probe: Rays | None, receivers:
             nearest_segment = dr.select(closer, i, nearest_segment)
         i += 1
     left = dr.sqrt(open_real * open_real + open_imag * open_imag)
-    return Sum(real, imag, left), Nearest(nearest2, nearest_segment, nearest_segment)
+    return Sum(real, imag, left), Nearest(nearest2, nearest_segment)

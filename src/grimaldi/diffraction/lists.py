@@ -89,14 +89,14 @@ class Listed(NamedTuple):
     def bounds(self, receivers: Receivers) -> tuple[Any, Any]:
         return self.lists.tested.bounds(receivers.block, receivers.active)
 
-    def visit(self, fr: Frame, i: Any) -> tuple[Any, Any, Any]:  # noqa: ARG002
+    def visit(self, fr: Frame, i: Any) -> tuple[Any, Any, Any]:
         ask = self.lists.verdict(i, self.cell + CELLS)
         return self.lists.tested.item(i), ask, ask
 
-    def after(self, i: Any, inside: Any) -> Any:  # noqa: ARG002
+    def after(self, i: Any, inside: Any) -> Any:
         return i + 1
 
-    def weight(self, fr: Frame, piece: Piece) -> Any:  # noqa: ARG002
+    def weight(self, fr: Frame, piece: Piece) -> Any:
         return type(fr.z2)(1)
 
 

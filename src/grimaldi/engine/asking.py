@@ -21,7 +21,7 @@ Ask = Callable[[Any, Any, Receivers], Factor]
 def ask(film: Squares, factor: Evaluate) -> Ask:
     """How to ask a model for M at what a camera sees."""
     if not isinstance(factor, Grouped):
-        return lambda x, y, receivers: _evaluated(factor, receivers)  # noqa: ARG005
+        return lambda x, y, receivers: _evaluated(factor, receivers)
     return partial(_by_blocks, film, factor.among(film.blocks), factor)
 
 

@@ -72,7 +72,8 @@ class _Nodes(NamedTuple):
     lit: NDArray[np.bool_]
 
     def of(self, squares: Integers) -> _Nodes:
-        return _Nodes(*(x[squares] for x in self))
+        o, d, p, n, shape, lit = self
+        return _Nodes(o[squares], d[squares], p[squares], n[squares], shape[squares], lit[squares])
 
 
 class _Group(NamedTuple):
@@ -87,6 +88,11 @@ class _Group(NamedTuple):
     lattice: Reals  # (squares, LATTICE², 3): where the samples' rays meet its plane, if it has one
     normals: Reals
 
+    def and_those_of(self, other: _Group) -> _Group:
+        """Both, one after the other."""
+        joined: list[Any] = [np.concatenate(pair) for pair in zip(self, other, strict=True)]
+        return _Group(*joined)
+
 
 def squares(see: Callable[[Any, Any], Sight], width: int, top: int, rows: int) -> Squares:
     """The blocks of `rows` rows of a film `width` pixels wide, from row `top` on."""
@@ -98,7 +104,7 @@ def squares(see: Callable[[Any, Any], Sight], width: int, top: int, rows: int) -
     second = _group(nodes.of(having), left[having].argmax(1), left[having])
     index = np.full(across * down, OUTSIDE, np.uint32)
     index[having] = across * down + np.arange(len(having))
-    both = _Group(*(np.concatenate(pair) for pair in zip(first, second, strict=True)))
+    both = first.and_those_of(second)
     square = np.append(np.arange(across * down), having)
     return Squares(
         _blocks(both, _beside(both, square, index, across, down)),
@@ -119,8 +125,8 @@ def _nodes(see: Callable[[Any, Any], Sight], across: int, down: int, top: int) -
     square = np.arange(across * down)
     corner = ACROSS * (square // across) * columns + ACROSS * (square % across)
     at = corner[:, None] + np.add.outer(np.arange(LATTICE) * columns, np.arange(LATTICE)).ravel()
-    vectors = (np.array(v, np.float64).T[at] for v in (sight.ray.o, sight.ray.d, r.p, r.n))
-    return _Nodes(*vectors, sight.shape.numpy()[at].astype(np.int64), r.active.numpy()[at])
+    o, d, p, n = (np.array(v, np.float64).T[at] for v in (sight.ray.o, sight.ray.d, r.p, r.n))
+    return _Nodes(o, d, p, n, sight.shape.numpy()[at].astype(np.int64), r.active.numpy()[at])
 
 
 def _group(nodes: _Nodes, seed: Integers, candidates: NDArray[np.bool_]) -> _Group:
@@ -148,7 +154,7 @@ def _group(nodes: _Nodes, seed: Integers, candidates: NDArray[np.bool_]) -> _Gro
         np.where(flat, 1.01 * size, ROOM * away),
         np.where(flat, 0.0, np.where(alone, 2.0, ROOM * turned)),
         np.where(flat[:, None], coplanar, same),
-        candidates.any(1),
+        np.any(candidates, axis=1),
         np.where(flat[:, None, None], plane, nodes.p),
         np.where(flat[:, None, None], N[:, None], nodes.n),
     )

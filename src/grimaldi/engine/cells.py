@@ -179,7 +179,8 @@ def _fill(nodes: _Nodes, grid: _Grid, order: tuple[Any, Any], x: Any, y: Any, si
         for m in range(3):
             dr.scatter(asked, mi.Bool(True), grid.node(x, y, size, m, n))
     asked &= ~nodes.there
-    index = dr.gather(mi.UInt32, order[0], dr.compress(dr.gather(mi.Bool, asked, order[0], order[1])))
+    left: Any = dr.compress(dr.gather(mi.Bool, asked, order[0], order[1]))
+    index = dr.gather(mi.UInt32, order[0], left)
     if len(index) == 0:
         return
     step = 0.5 * (1 << grid.shift)

@@ -154,7 +154,8 @@ class Samples(NamedTuple):
         rank = dr.gather(mi.UInt32, self.rank, pixel, active)
         holds = active & (rank != OUTSIDE)
         place = rank * dr.opaque(mi.UInt32, spp) + (index - pixel * dr.opaque(mi.UInt32, spp))
-        return Known(*(dr.gather(mi.Float64, values, place, holds) for values in self[1:]), holds)
+        real, imag, error = (dr.gather(mi.Float64, values, place, holds) for values in self[1:])
+        return Known(real, imag, error, holds)
 
 
 def _at_samples(light: Light, ask: Ask, sensor: Any, shot: Shot, first: int, pixels: int, cells: Cells) -> Samples:
