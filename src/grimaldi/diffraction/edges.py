@@ -14,7 +14,7 @@ import numpy as np
 from grimaldi.diffraction.arrays import on_device
 from grimaldi.diffraction.corners import Corner, between, corner
 from grimaldi.diffraction.creeping import damped
-from grimaldi.diffraction.frame import Frame, constant
+from grimaldi.diffraction.frame import ROUNDINGS, Frame, constant
 from grimaldi.diffraction.grazing import Near, grazed, other_than, worth
 from grimaldi.diffraction.hierarchy import NONE, least_detour
 from grimaldi.diffraction.model import Receivers
@@ -197,7 +197,8 @@ def sounds(fr: Frame, piece: Piece, n: Any) -> Any:
     d = fr.foot + fr.z2 * fr.a - piece.middle  # X→P
     length = dr.norm(d)
     free = dr.squared_norm(n) == 0
-    above = free | (dr.dot(n, d) < -1e-4 * length)
+    aside = 2 * ROUNDINGS * dr.epsilon(length) * fr.lever  # by which the ray was moved, P with it
+    above = free | (dr.dot(n, d) < -1e-4 * length - aside)
     behind = (piece.closed > 0.5) | (dr.dot(piece.lit, d) < -1e-6 * length)
     return above & behind
 

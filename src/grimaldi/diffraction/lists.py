@@ -147,13 +147,14 @@ def lists(search: Search, blocks: Blocks) -> Lists:
     # where a piece reaches this block but not the next in the same plane, it may not reach all of it
     reached = dr.zeros(mi.Bool, number * n)
     dr.scatter(reached, seen.open, pairs.index)
-    changes = dr.gather(mi.Float, blocks.bend, pairs.block) > 0
+    curved = dr.gather(mi.Float, blocks.bend, pairs.block) > 0
+    changes = mi.Bool(curved)
     for side in blocks.beside:
         other = dr.gather(mi.UInt32, side, pairs.block) * n + pairs.piece
         changes |= dr.gather(mi.Bool, reached, other) != seen.open
     limit = 2 * np.pi * tolerance
     faint = seen.far & (dr.maximum(dr.abs(seen.start), dr.abs(seen.stop)) < UNTESTED * limit)
-    tested = changes & ~faint | seen.passes
+    tested = curved | (changes & ~faint) | seen.passes
     dropped = seen.open & ~tested & seen.far & (seen.inner2 < dr.square(CORNER * limit))
     kept = seen.open & ~tested & ~dropped
     dr.eval(tested, kept, dropped)
@@ -292,12 +293,14 @@ def _from_middle(
 def _verdicts(search: Search, blocks: Blocks, pairs: _Pairs, tested: Any, passes: Any) -> Any:
     """Which cells of blocks pieces reach, of those that are `tested`: by a ray to each corner of the cells.
 
-    Where the corners that lie on the block's surface differ, the cell is to be asked, and all of them for what `passes`
-    other silhouettes.
+    Where corners differ, or lie on another surface, the cell is to be asked, and all of them for what `passes` other
+    silhouettes.
     """
     found = dr.zeros(mi.UInt32, len(tested))
     pair: Any = dr.compress(tested)
-    if search.probe is None or len(pair) == 0:
+    if len(pair) == 0:
+        return found
+    if search.probe is None:
         dr.scatter(found, mi.UInt32(ALL), pair)
         return found
     side = ACROSS + 1
@@ -311,9 +314,10 @@ def _verdicts(search: Search, blocks: Blocks, pairs: _Pairs, tested: Any, passes
     for y in range(ACROSS):
         for x in range(ACROSS):
             cell = 1 << (y * ACROSS + x)
-            of = members & sum(1 << ((y + dy) * side + x + dx) for dy in (0, 1) for dx in (0, 1))
-            whole |= dr.select((of != 0) & ((bits & of) == of), cell, 0)
-            none |= dr.select((of != 0) & ((bits & of) == 0), cell, 0)
+            corners = sum(1 << ((y + dy) * side + x + dx) for dy in (0, 1) for dx in (0, 1))
+            same = (members & corners) == corners
+            whole |= dr.select(same & ((bits & corners) == corners), cell, 0)
+            none |= dr.select(same & ((bits & corners) == 0), cell, 0)
     verdict = whole | ((~(whole | none) & (ALL >> CELLS)) << CELLS)
     dr.scatter(found, dr.select(dr.gather(mi.Bool, passes, pair), ALL, verdict), pair)
     dr.eval(found)

@@ -159,7 +159,8 @@ def table(
     normals = outline.normals[middle]
     closed = (np.linalg.norm(normals[:, 1], axis=1) > 0).astype(float)[:, None]
     of = outline.body[middle].astype(float)[:, None]
-    behind = np.array([np.minimum(outline.behind, 1e30)[a:b].min() for a, b in runs])[:, None]
+    far_behind = np.append(np.minimum(outline.behind, 1e30), 1e30)
+    behind = np.minimum.reduceat(far_behind, runs.ravel())[::2, None]  # over first..end: every other of the slices
     pieces = np.concatenate(
         [
             *(target, reach, normals[:, 0], closed, normals[:, 1], of, outline.outward[middle], behind),

@@ -125,8 +125,12 @@ def _nodes(see: Callable[[Any, Any], Sight], across: int, down: int, top: int) -
     square = np.arange(across * down)
     corner = ACROSS * (square // across) * columns + ACROSS * (square % across)
     at = corner[:, None] + np.add.outer(np.arange(LATTICE) * columns, np.arange(LATTICE)).ravel()
-    o, d, p, n = (np.array(v, np.float64).T[at] for v in (sight.ray.o, sight.ray.d, r.p, r.n))
-    return _Nodes(o, d, p, n, sight.shape.numpy()[at].astype(np.int64), r.active.numpy()[at])
+    o, d, p, n = (np.array(v, np.float64).T for v in (sight.ray.o, sight.ray.d, r.p, r.n))
+    every: list[Any] = [
+        np.broadcast_to(v, (len(x), *v.shape[1:]))[at]  # what is the same everywhere is there once
+        for v in (o, d, p, n, sight.shape.numpy().astype(np.int64), r.active.numpy())
+    ]
+    return _Nodes(*every)
 
 
 def _group(nodes: _Nodes, seed: Integers, candidates: NDArray[np.bool_]) -> _Group:

@@ -145,6 +145,7 @@ class Samples(NamedTuple):
     """M at all samples of some pixels of a tile."""
 
     rank: Any  # of a pixel among them, OUTSIDE if it is none of them
+    there: Any  # whether a sample saw a lit surface: beside an edge, rounding decides, and a second look may differ
     real: Any
     imag: Any
     error: Any
@@ -154,7 +155,8 @@ class Samples(NamedTuple):
         rank = dr.gather(mi.UInt32, self.rank, pixel, active)
         holds = active & (rank != OUTSIDE)
         place = rank * dr.opaque(mi.UInt32, spp) + (index - pixel * dr.opaque(mi.UInt32, spp))
-        real, imag, error = (dr.gather(mi.Float64, values, place, holds) for values in self[1:])
+        holds &= dr.gather(mi.Bool, self.there, place, holds)
+        real, imag, error = (dr.gather(mi.Float64, values, place, holds) for values in self[2:])
         return Known(real, imag, error, holds)
 
 
@@ -166,7 +168,7 @@ def _at_samples(light: Light, ask: Ask, sensor: Any, shot: Shot, first: int, pix
     own: Any = dr.compress(~cells.knows(every % width, every // width))
     if len(own) == 0:
         none = dr.zeros(mi.Float64, 1)
-        return Samples(rank, none, none, none)
+        return Samples(rank, dr.zeros(mi.Bool, 1), none, none, none)
     dr.scatter(rank, dr.arange(mi.UInt32, len(own)), own)
     index = dr.arange(mi.UInt32, len(own) * shot.spp)
     of = index // dr.opaque(mi.UInt32, shot.spp)
@@ -174,7 +176,7 @@ def _at_samples(light: Light, ask: Ask, sensor: Any, shot: Shot, first: int, pix
     _, film = _sample(shot, pixel, index - of * dr.opaque(mi.UInt32, shot.spp))
     (_, receivers, _), _ = _sight(light, sensor, shot, film.x, film.y)
     m = ask(film.x, film.y, receivers)
-    return Samples(rank, m.real, m.imag, m.error)
+    return Samples(rank, receivers.active, m.real, m.imag, m.error)
 
 
 def render_tile(light: Light, sensor: Any, shot: Shot, first: int, pixels: int, band: Band | None = None) -> Tile:
