@@ -22,6 +22,8 @@ from grimaldi.diffraction.model import Options, Receivers
 from grimaldi.diffraction.reach import reach
 from grimaldi.diffraction.segment import Corners, Rule, line, segment_wave
 from grimaldi.engine.cells import LARGEST, Nodes, cells
+from grimaldi.engine.tiles import Shot, bands, sight
+from grimaldi.light import Settings, prepare
 
 mi: Any = mitsuba
 mi.set_variant("llvm_ad_rgb")
@@ -138,6 +140,27 @@ def test_what_lies_far_from_the_rays_is_left_out_within_the_tolerance(crowd):
     assert np.isfinite(far)
     off = abs(factors(scene, points, replace(outline, far=far), options) - factors(scene, points, outline, options))
     assert 0 < off.max() < options.tolerance
+
+
+# ---------------------------------------------------------------- blocks of receivers
+
+
+@pytest.mark.parametrize("occlusion", ["none", "graded"])
+def test_lists_of_blocks_add_up_to_all_pieces(occlusion):
+    """At what a camera sees of a floor under twelve bodies; a few points may lie where a thin shadow goes unseen."""
+    tolerance = 2e-2
+    scene = grimaldi.load(scenes.bodies(12, seed=2, size=64, spp=1))
+    light = prepare(scene, Settings(wavelength=scenes.WAVELENGTH, tolerance=tolerance, occlusion=occlusion))
+    sensor, shot = scene.mitsuba.sensors()[0], Shot(64, 64, 1, 0, 2, 5, False)
+    (band,) = bands(light, sensor, shot)
+    rng = np.random.default_rng(1)
+    x, y = (mi.Float(v) for v in rng.uniform(0, 64, (2, 4000)).astype(np.float32))
+    (_, receivers, _), _ = sight(light, sensor, shot, x, y)
+    fast, whole = band.asks[0](x, y, receivers), light.beams[0].factor(receivers)
+    off = np.hypot((fast.real - whole.real).numpy(), (fast.imag - whole.imag).numpy())[receivers.active.numpy()]
+    assert abs(whole.real.numpy() - 1).max() > 0.5
+    assert np.quantile(off, 0.99) < 0.5 * tolerance
+    assert 0 < off.max() < (tolerance if occlusion == "none" else 0.15)
 
 
 # ---------------------------------------------------------------- cells of the film

@@ -33,6 +33,7 @@ from grimaldi.scene.model import Scene, Source
 mi: Any = mitsuba  # the stubs refuse numbers where arrays are asked for
 
 AS_ONE = 4.0  # rad at a tolerance of 1: half of what a run of pieces subtends that is tested by one ray X→P
+LOOSE = 5e-3  # tolerance from which on blocks have lists: thin shadows that they miss are steps in M of some percent
 UNASKED = 0.3  # of the tolerance: what all pieces whose X→P goes untested may add to M, each the same
 
 
@@ -246,10 +247,10 @@ class _Bodies:
         return self if found is None else partial(self, found=found)
 
     def lists(self, blocks: Blocks) -> Lists | None:
-        """What acts on each block; None where ends of runs are not enough."""
+        """What acts on each block; None where ends of runs, or what a few rays tell of a block, are not enough."""
         _, source, _, k, options, _ = self.problem
         tab, corners = self.tab, self.rule.corners
-        if corners is None or options.rim == "smooth":
+        if corners is None or options.rim == "smooth" or options.tolerance < LOOSE:
             return None
         search = Search(source, tab, tab.device(k), corners, options.tolerance, self.share, self.probe, self.grazing)
         return lists(search, blocks)

@@ -27,6 +27,7 @@ from grimaldi.scene.model import Source
 mi: Any = mitsuba  # the stubs refuse numbers where arrays are asked for
 
 CORNER = 0.02  # of the tolerance: |M| of a corner that is left out
+FINE = 1 << 16  # parts of its square, in which it is counted: sums of whole numbers are the same in any order
 CELLS = ACROSS * ACROSS
 ALL = ((1 << CELLS) - 1) << CELLS  # every cell to be tested
 UNTESTED = 0.1  # of the tolerance: |M| of an end that reaches a block or not as a whole, by what its middle says
@@ -176,8 +177,9 @@ def lists(search: Search, blocks: Blocks) -> Lists:
     left2 = dr.select(dropped, seen.inner2, 0) + dr.select(joint, dr.square(turn), 0)
     left2 += dr.select(begins & ~strong[0], dr.square(seen.start), 0)
     left2 += dr.select(stops & ~strong[1], dr.square(seen.stop), 0)
-    left = dr.zeros(mi.Float, number)
-    dr.scatter_add(left, left2, pairs.block)
+    unit = (CORNER * limit) ** 2 / FINE
+    left = dr.zeros(mi.UInt64, number)
+    dr.scatter_add(left, mi.UInt64(dr.ceil(left2 / unit)), pairs.block)
     first, end = tab.range(pairs.piece)
     verdicts = _verdicts(search, blocks, pairs, tested, seen.passes)
     some = verdicts != 0
@@ -189,7 +191,7 @@ def lists(search: Search, blocks: Blocks) -> Lists:
         List.of(kept & ~goes_on, pairs.block, number, end - 1),
         List.of(begins & strong[0], pairs.block, number, first),
         List.of(stops & strong[1], pairs.block, number, end - 1),
-        dr.sqrt(left) / (2 * np.pi),
+        dr.sqrt(mi.Float(left) * unit) / (2 * np.pi),
         beside,
     )
 

@@ -94,7 +94,7 @@ def bands(light: Light, sensor: Any, shot: Shot) -> Iterator[Band]:
     step = LARGEST * max(int(1 / max(row, items * shot.width / (LARGEST * PAIRS))), 1)
     for top in range(0, shot.height, step):
         rows = min(step, shot.height - top)
-        film = squares(lambda x, y: _sight(light, sensor, shot, x, y)[0], shot.width, top, rows)
+        film = squares(lambda x, y: sight(light, sensor, shot, x, y)[0], shot.width, top, rows)
         asks = tuple(ask(film, beam.factor) for beam in light.beams)
         nodes = (partial(_nodes, light, a, sensor, shot) for a in asks)
         found = tuple(cells(at, shot.width, top, rows, finest, light.interpolated) for at in nodes)
@@ -111,7 +111,7 @@ def tiles(light: Light, shot: Shot, band: Band) -> Iterator[tuple[int, int]]:
         yield first + begin, min(step, pixels - begin)
 
 
-def _sight(light: Light, sensor: Any, shot: Shot, x: Any, y: Any) -> tuple[Sight, Any]:
+def sight(light: Light, sensor: Any, shot: Shot, x: Any, y: Any) -> tuple[Sight, Any]:
     """What the camera sees at places of the film [pixels], and Mitsuba's interactions."""
     place = mi.Point2f(x, y) / mi.Point2f(dr.opaque(mi.Float, shot.width), dr.opaque(mi.Float, shot.height))
     ray, _ = sensor.sample_ray_differential(sensor.shutter_open(), 0.5, place, mi.Point2f(0.5))
@@ -124,7 +124,7 @@ def _sight(light: Light, sensor: Any, shot: Shot, x: Any, y: Any) -> tuple[Sight
 
 def _nodes(light: Light, ask: Ask, sensor: Any, shot: Shot, x: Any, y: Any) -> Nodes:
     """M at what the camera sees at places of the film [pixels]."""
-    (ray, receivers, shape), si = _sight(light, sensor, shot, x, y)
+    (ray, receivers, shape), si = sight(light, sensor, shot, x, y)
     m = ask(x, y, receivers)
     n = receivers.n
     pixel = mi.Float(0)
@@ -174,7 +174,7 @@ def _at_samples(light: Light, ask: Ask, sensor: Any, shot: Shot, first: int, pix
     of = index // dr.opaque(mi.UInt32, shot.spp)
     pixel = dr.opaque(mi.UInt32, first) + dr.gather(mi.UInt32, own, of)
     _, film = _sample(shot, pixel, index - of * dr.opaque(mi.UInt32, shot.spp))
-    (_, receivers, _), _ = _sight(light, sensor, shot, film.x, film.y)
+    (_, receivers, _), _ = sight(light, sensor, shot, film.x, film.y)
     m = ask(film.x, film.y, receivers)
     return Samples(rank, receivers.active, m.real, m.imag, m.error)
 
