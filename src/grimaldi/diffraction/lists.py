@@ -14,7 +14,7 @@ import mitsuba
 import numpy as np
 
 from grimaldi.diffraction.corners import Corner, corner, leading, slopes
-from grimaldi.diffraction.edges import Margins, Nearest, Sum, chain_wave, cut_off, sounds
+from grimaldi.diffraction.edges import Chain, Margins, Nearest, Sum, chain_wave, cut_off, sounds
 from grimaldi.diffraction.frame import Frame, constant, frame
 from grimaldi.diffraction.grazing import Chords, Near, near, other_than, worth
 from grimaldi.diffraction.hierarchy import least_detour
@@ -339,6 +339,20 @@ def _reached(search: Search, probe: Rays, blocks: Blocks, pairs: _Pairs, pair: A
     return acts & probe.reaches(x, piece, q + probe.epsilon(q) * n, acts)
 
 
+def _with(total: tuple[Any, ...], chain: Chain) -> tuple[Any, ...]:
+    """A chain added to the five of a sum, the least distances² to P and to the ray, and the segment there.
+
+    A plain tuple: what Dr.Jit can carry from turn to turn.
+    """
+    *sums, receiver2, nearest2, segment = total
+    return (
+        *(s + wave for s, wave in zip(sums, chain.wave, strict=True)),
+        dr.minimum(receiver2, chain.receiver2),
+        dr.minimum(nearest2, chain.distance2),
+        dr.select(chain.distance2 < nearest2, chain.segment, segment),
+    )
+
+
 @dr.syntax
 def listed_sum(
     fr: Frame, tab: Table, found: Lists, k: Any, rule: Rule, tested: tuple[Sum, Nearest, Margins], receivers: Receivers
@@ -347,31 +361,20 @@ def listed_sum(
     F = tab.types.Float
     U = dr.uint32_array_t(F)
     sums, nearest, margins = tested
-    real, imag, err_real, err_imag, rounding2 = sums[:5]
-    nearest2, nearest_segment, receiver2 = F(nearest.distance2), U(nearest.segment), F(margins.receiver2)
+    total = (*sums[:5], F(margins.receiver2), F(nearest.distance2), U(nearest.segment))
     active, block = receivers.active, receivers.block
     i, end = found.tested.bounds(block, active)
     while active & (i < end):
         whole = active & found.verdict(i, receivers.cell)
         if whole:
-            chain = chain_wave(fr, tab, *tab.range(found.tested.item(i)), k, rule, None, False, whole)
-            real, imag = real + chain.wave.real, imag + chain.wave.imag
-            err_real, err_imag = err_real + chain.wave.err_real, err_imag + chain.wave.err_imag
-            rounding2 += chain.wave.rounding2
-            receiver2 = dr.minimum(receiver2, chain.receiver2)
-            nearest_segment = dr.select(chain.distance2 < nearest2, chain.segment, nearest_segment)
-            nearest2 = dr.minimum(nearest2, chain.distance2)
+            total = _with(total, chain_wave(fr, tab, *tab.range(found.tested.item(i)), k, rule, None, False, whole))
         i += 1
     i, end = found.first.bounds(block, active)
     while active & (i < end):
-        chain = chain_wave(fr, tab, found.first.item(i), found.last.item(i) + 1, k, rule, None, False, active)
-        real, imag = real + chain.wave.real, imag + chain.wave.imag
-        err_real, err_imag = err_real + chain.wave.err_real, err_imag + chain.wave.err_imag
-        rounding2 += chain.wave.rounding2
-        receiver2 = dr.minimum(receiver2, chain.receiver2)
-        nearest_segment = dr.select(chain.distance2 < nearest2, chain.segment, nearest_segment)
-        nearest2 = dr.minimum(nearest2, chain.distance2)
+        first, last = found.first.item(i), found.last.item(i)
+        total = _with(total, chain_wave(fr, tab, first, last + 1, k, rule, None, False, active))
         i += 1
+    real, imag, err_real, err_imag, rounding2, receiver2, nearest2, nearest_segment = total
     i, end = found.begins.bounds(block, active)
     while active & (i < end):
         seg = tab.segment(found.begins.item(i))

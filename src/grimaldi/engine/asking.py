@@ -20,9 +20,10 @@ Ask = Callable[[Any, Any, Receivers], Factor]
 
 def ask(film: Squares, factor: Evaluate) -> Ask:
     """How to ask a model for M at what a camera sees."""
-    if not isinstance(factor, Grouped):
+    listed = factor.among(film.blocks) if isinstance(factor, Grouped) else factor
+    if listed is factor:
         return lambda x, y, receivers: _evaluated(factor, receivers)
-    return partial(_by_blocks, film, factor.among(film.blocks), factor)
+    return partial(_by_blocks, film, listed, factor)
 
 
 def _by_blocks(film: Squares, listed: Evaluate, whole: Evaluate, x: Any, y: Any, receivers: Receivers) -> Factor:

@@ -171,8 +171,8 @@ def _beside(group: _Group, square: Integers, second: NDArray[np.uint32], across:
     x, y = square % across, square // across
     found = []
     for dy in (-1, 0, 1):
-        for dx in (-1, 0, 1):
-            there = (x + dx >= 0) & (x + dx < across) & (y + dy >= 0) & (y + dy < down) & (dx | dy != 0)
+        for dx in (-1, 0, 1) if dy else (-1, 1):
+            there = (x + dx >= 0) & (x + dx < across) & (y + dy >= 0) & (y + dy < down)
             beside = np.where(there, square + dy * across + dx, square)
             best = own.copy()
             for other in (beside, np.where(second[beside] == OUTSIDE, beside, second[beside]).astype(np.int64)):
