@@ -73,7 +73,7 @@ def layout(centre: NDArray[np.float64], radius: NDArray[np.float64], group: NDAr
     """The hierarchy of items (n, 3) with radii (n,): near groups together, items of a group in their order."""
     n = len(centre)
     _, of = np.unique(group, return_inverse=True)
-    place = _morton(np.stack([np.bincount(of, x) for x in centre.T], axis=1) / np.bincount(of)[:, None])
+    place = morton(np.stack([np.bincount(of, x) for x in centre.T], axis=1) / np.bincount(of)[:, None])
     order = np.lexsort((np.arange(n), of, place[of]))
     centre, radius = centre[order], radius[order]
     blocks = _blocks(n)
@@ -106,7 +106,7 @@ def _blocks(n: int) -> list[int]:
     return sizes
 
 
-def _morton(x: NDArray[np.float64]) -> NDArray[np.int64]:
+def morton(x: NDArray[np.float64]) -> NDArray[np.int64]:
     """Places (n, 3) along Morton's curve: near each other where they are near in space."""
     low = x.min(0)
     cells = ((x - low) / max(float(np.ptp(x, axis=0).max()), 1e-300) * (2**BITS - 1)).astype(np.int64)

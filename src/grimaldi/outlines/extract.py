@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -59,8 +60,8 @@ def _bodies(scene: Scene, source: Source, sag: Sequence[float]) -> Outline:
 
 
 def soup_of(scene: Scene) -> Soup:
-    """The triangles of a scene's bodies."""
-    return once(scene, ("soup",), lambda: Soup.of(scene.bodies))
+    """The triangles of a scene's bodies, of facets where they have them."""
+    return once(scene, ("soup",), lambda: Soup.of([body.facets or body.geometry for body in scene.bodies]))
 
 
 def default_sags(bodies: Sequence[Body]) -> list[float]:
@@ -70,7 +71,7 @@ def default_sags(bodies: Sequence[Body]) -> list[float]:
 
 def edges_of(scene: Scene, source: Source, sag: Sequence[float]) -> tuple[Candidates, Integers]:
     """The silhouette edges of a scene's bodies, lit or not, and the body (n,) of each, rising; sag as in `outline`."""
-    edges, body = once(scene, ("edges", source), lambda: mesh.silhouettes(soup_of(scene), source))
+    edges, body = once(scene, ("edges", source), lambda: _of_meshes(scene, source))
     parts, owner = [edges], [body]
     for i, (of, s) in enumerate(zip(scene.bodies, sag, strict=True)):
         if not isinstance(of.geometry, Mesh):
@@ -79,6 +80,17 @@ def edges_of(scene: Scene, source: Source, sag: Sequence[float]) -> tuple[Candid
     body = np.concatenate(owner)
     order = np.argsort(body, kind="stable")
     return Candidates.concatenate(parts)[order], body[order]
+
+
+def _of_meshes(scene: Scene, source: Source) -> tuple[Candidates, Integers]:
+    """The silhouette edges of meshes, and the body of each; edges of facets have the names of the mesh's."""
+    edges, body = mesh.silhouettes(soup_of(scene), source)
+    name = edges.edge.copy()
+    for i, of in enumerate(scene.bodies):
+        if of.facets is not None:
+            own = slice(*np.searchsorted(body, [i, i + 1]))
+            name[own] = of.facets.edges.ravel()[name[own]]
+    return replace(edges, edge=name), body
 
 
 def _extents(points: Reals, body: Integers) -> Reals:

@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 
 from grimaldi.outlines import cylinder, disk
 from grimaldi.outlines.candidate import Candidates, closed_curve, polygon, toward
-from grimaldi.outlines.extract import assemble, curve, sight_of, soup_of
+from grimaldi.outlines.extract import assemble, curve, sight_of
 from grimaldi.outlines.lit import Stretches
+from grimaldi.outlines.memory import once
 from grimaldi.outlines.mesh import normals_beside
 from grimaldi.outlines.model import Outline, Reals
 from grimaldi.outlines.soup import Soup
@@ -37,7 +38,7 @@ def offset_outline(scene: Scene, source: Source, epsilon: float | None = None) -
     of a disk the rim, of a cylinder both rims and its tangent lines, each as about 32 edges, where the source reaches
     their middles.
     """
-    soup = soup_of(scene)
+    soup = once(scene, ("triangles",), lambda: Soup.of([body.geometry for body in scene.bodies]))
     parts: list[Candidates] = []
     for number, body in enumerate(scene.bodies):
         geometry = body.geometry

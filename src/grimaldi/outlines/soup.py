@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from grimaldi.outlines.model import Integers, Reals
-from grimaldi.scene.model import Body, Mesh
+from grimaldi.scene.model import Geometry, Mesh
 from grimaldi.scene.triangles import merged_points
 
 
@@ -27,11 +27,11 @@ class Soup:
     first: Integers  # (bodies + 1,) each body's first triangle; as long as there are bodies, meshes or not
 
     @staticmethod
-    def of(bodies: Sequence[Body]) -> Soup:
-        """All triangles of the bodies that are meshes, in their order."""
-        meshes = [(i, body.geometry) for i, body in enumerate(bodies) if isinstance(body.geometry, Mesh)]
+    def of(shapes: Sequence[Geometry]) -> Soup:
+        """All triangles of the bodies that are meshes, in their order; shapes: each body's."""
+        meshes = [(i, shape) for i, shape in enumerate(shapes) if isinstance(shape, Mesh)]
         n_points = [len(mesh.vertices) for _, mesh in meshes]
-        n_faces = np.zeros(len(bodies), np.int64)
+        n_faces = np.zeros(len(shapes), np.int64)
         n_faces[[i for i, _ in meshes]] = [len(mesh.faces) for _, mesh in meshes]
         offset = np.cumsum([0, *n_points])
         points = np.concatenate([np.empty((0, 3)), *(mesh.vertices for _, mesh in meshes)]).T + 0.0  # -0.0 becomes 0.0
@@ -44,7 +44,7 @@ class Soup:
         if len(kept) == points.shape[1]:
             kept, number = np.arange(len(kept)), np.arange(len(kept))
         return Soup(
-            np.ascontiguousarray(points[:, kept]), number[corners], np.repeat(np.arange(len(bodies)), n_faces), first
+            np.ascontiguousarray(points[:, kept]), number[corners], np.repeat(np.arange(len(shapes)), n_faces), first
         )
 
     def __len__(self) -> int:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from grimaldi.errors import InputError
+from grimaldi.scene.facets import facets
 from grimaldi.scene.model import Body, Cylinder, Disk, Geometry, Mesh, Sphere
 from grimaldi.scene.planar import PlanarOutline
 from grimaldi.scene.triangles import as_mesh
@@ -67,20 +68,25 @@ def sort_shapes(shapes: Iterable[Any]) -> Shapes:
         if is_aperture(shape):
             holes.append(planar_outline(shape, name))
         elif surface is not None and _is_opaque(shape):
-            bodies.append(Body(name, index, surface))
+            bodies.append(Body(name, index, surface, facets(surface) if isinstance(surface, Mesh) else None))
         else:
             others.append(name)
     return Shapes(tuple(surfaces), tuple(bodies), tuple(holes), tuple(others))
 
 
-def blockers(mi_scene: Any) -> Any:
+def blockers(mi_scene: Any, bodies: Iterable[Body]) -> Any:
     """A Mitsuba scene that shares all shapes that stop light, also those that do not diffract; None without any.
 
     Only what has a null BSDF or part (apertures, masks, media) is left out. Embree's robust mode finds rays that
     meet an edge exactly, as those along an outline do. Of cylinders it holds the faces: Mitsuba's own intersection
     solves a quadratic in Float32, which from 150 radii away misses a cylinder's wall by a twentieth of its radius.
+    Of `bodies` that have facets it holds these.
     """
-    opaque = [shape for shape in mi_scene.shapes() if not _lets_through(shape)]
+    shapes = list(mi_scene.shapes())
+    for body in bodies:
+        if body.facets is not None:
+            shapes[body.shape] = _as_shape(shapes[body.shape], body.facets)
+    opaque = [shape for shape in shapes if not _lets_through(shape)]
     if not opaque:
         return None
     return _sharing([_faces(shape) for shape in opaque], embree_use_robust_intersections=True)
@@ -116,13 +122,19 @@ def carries_light(shape: Any) -> bool:
 
 def _faces(shape: Any) -> Any:
     """A cylinder's faces; any other shape itself."""
-    import mitsuba as mi
-
     if shape.class_name() != "Cylinder":
         return shape
     angle = 2 * np.pi * np.arange(FACES_ROUND) / FACES_ROUND
-    wall = tube(Cylinder(_to_world(shape)), np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1))
-    return as_mesh(mi, shape.id(), wall.vertices, wall.faces, mi.Properties())
+    return _as_shape(
+        shape, tube(Cylinder(_to_world(shape)), np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1))
+    )
+
+
+def _as_shape(shape: Any, mesh: Mesh) -> Any:
+    """A mesh in the place of a shape, for rays alone."""
+    import mitsuba as mi
+
+    return as_mesh(mi, shape.id(), mesh.vertices, mesh.faces, mi.Properties())
 
 
 def tube(cylinder: Cylinder, ring: Reals) -> Mesh:

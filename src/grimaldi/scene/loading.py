@@ -79,7 +79,7 @@ def _smoothed(scene: Scene, levels: int) -> Scene:
     if finer is scene.mitsuba:
         return scene
     bodies = sort_shapes(finer.shapes()).bodies
-    return replace(scene, mitsuba=finer, blockers=blockers(finer), bodies=bodies, smooth=scene.smooth + levels)
+    return replace(scene, mitsuba=finer, blockers=blockers(finer, bodies), bodies=bodies, smooth=scene.smooth + levels)
 
 
 def _outlines(outlines: Iterable[PlanarOutline]) -> tuple[PlanarOutline, ...]:
@@ -108,7 +108,7 @@ def _read(scene: Any, coherent: Collection[str]) -> Scene:
     return Scene(
         name=name,
         mitsuba=mi_scene,
-        blockers=blockers(mi_scene),
+        blockers=blockers(mi_scene, shapes.bodies),
         surfaces=shapes.surfaces,
         bodies=shapes.bodies,
         sources=found,

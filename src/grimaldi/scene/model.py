@@ -59,6 +59,16 @@ class Mesh:
 
 
 @dataclass(frozen=True, eq=False)
+class Facets(Mesh):
+    """Triangles in the place of those of a mesh; edges (m, 3): where in the mesh the edge from each corner on begins.
+
+    They are numbers 3 f + i of edges from corner i of face f on; inside a facet, that of some edge at its border.
+    """
+
+    edges: NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
 class Sphere:
     centre: Vector
     radius: float
@@ -83,11 +93,16 @@ Geometry = Mesh | Sphere | Disk | Cylinder
 
 @dataclass(frozen=True, eq=False)
 class Body:
-    """An opaque shape that casts outlines. `shape` is its index in `mi.Scene.shapes()`."""
+    """An opaque shape that casts outlines.
+
+    `shape` is its index in `mi.Scene.shapes()`; `facets` stands for the geometry of a mesh that has much more triangles
+    than its plane parts need.
+    """
 
     name: str
     shape: int
     geometry: Geometry
+    facets: Facets | None = None
 
 
 @dataclass(frozen=True, eq=False)
