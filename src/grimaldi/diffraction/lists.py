@@ -28,8 +28,10 @@ mi: Any = mitsuba  # the stubs refuse numbers where arrays are asked for
 
 CORNER = 0.02  # of the tolerance: |M| of a corner that is left out
 FINE = 1 << 16  # parts of its square, in which it is counted: sums of whole numbers are the same in any order
-CELLS = ACROSS * ACROSS
-ALL = ((1 << CELLS) - 1) << CELLS  # every cell to be tested
+WEAK = 0.1  # of the tolerance: |M| of an end that grows evenly between corners of cells which it reaches or not
+REMOTE = 1.5  # radii of a block, that such a piece is away from it at least
+LATTICE = ACROSS + 1
+ALL = (1 << ACROSS * ACROSS) - 1  # cells
 UNTESTED = 0.1  # of the tolerance: |M| of an end that reaches a block or not as a whole, by what its middle says
 
 
@@ -62,7 +64,8 @@ class Lists(NamedTuple):
     """What acts on each block: pieces to be tested, runs of segments that reach it, ends of runs, |M| left out."""
 
     tested: List  # pieces
-    verdicts: Any  # on each of those: CELLS bits of the cells it reaches whole, and CELLS of those where to test it
+    asked: Any  # of each of those a bit for each cell where it is tested at every receiver
+    reached: Any  # elsewhere it reaches corners of cells, a bit for each, and what lies between in part
     first: List  # segments where runs begin
     last: List  # and the last of each
     begins: List  # segments at whose start a far run begins
@@ -70,9 +73,18 @@ class Lists(NamedTuple):
     left: Any
     beside: Near | None  # the bodies whose silhouettes pass closest by each
 
-    def verdict(self, i: Any, bit: Any) -> Any:
-        """A bit of what is known of a piece to be tested."""
-        return ((dr.gather(mi.UInt32, self.verdicts, i) >> bit) & 1) != 0
+    def asks(self, i: Any, cell: Any) -> Any:
+        """Whether a piece to be tested is asked for at each receiver in a cell."""
+        return ((dr.gather(mi.UInt32, self.asked, i) >> cell) & 1) != 0
+
+    def share(self, i: Any, receivers: Receivers) -> Any:
+        """How much of a piece reaches receivers, by the corners of their cells: between them it grows evenly."""
+        cell = receivers.cell
+        bits = dr.gather(mi.UInt32, self.reached, i) >> ((cell // ACROSS) * LATTICE + cell % ACROSS)
+        near, far = (
+            dr.lerp(mi.Float((bits >> row) & 1), mi.Float((bits >> (row + 1)) & 1), receivers.u) for row in (0, LATTICE)
+        )
+        return dr.lerp(near, far, receivers.v)
 
     def near(self, receivers: Receivers, silhouettes: Chords | None) -> Near | None:
         """The bodies beside the receivers' blocks."""
@@ -91,7 +103,7 @@ class Listed(NamedTuple):
         return self.lists.tested.bounds(receivers.block, receivers.active)
 
     def visit(self, fr: Frame, i: Any) -> tuple[Any, Any, Any]:
-        ask = self.lists.verdict(i, self.cell + CELLS)
+        ask = self.lists.asks(i, self.cell)
         return self.lists.tested.item(i), ask, ask
 
     def after(self, i: Any, inside: Any) -> Any:
@@ -130,6 +142,7 @@ class _Seen(NamedTuple):
     """Pieces from the middles of blocks."""
 
     open: Any  # whether it acts there
+    weak: Any  # whether a chain cut off on it leaves little everywhere in the block
     far: Any  # whether leading terms serve everywhere in the block
     inner2: Any  # sum of squares of what its inner corners send
     start: Any  # C φ'/ψ' at its ends
@@ -181,12 +194,13 @@ def lists(search: Search, blocks: Blocks) -> Lists:
     left = dr.zeros(mi.UInt64, number)
     dr.scatter_add(left, mi.UInt64(dr.ceil(left2 / unit)), pairs.block)
     first, end = tab.range(pairs.piece)
-    verdicts = _verdicts(search, blocks, pairs, tested, seen.passes)
-    some = verdicts != 0
+    asked, reached = _verdicts(search, blocks, pairs, tested, seen)
+    some = (asked | reached) != 0
     dr.eval(begins, stops, first, end, goes_on, some)
     return Lists(
         List.of(some, pairs.block, number, pairs.piece),
-        List.of(some, pairs.block, number, verdicts).items,
+        List.of(some, pairs.block, number, asked).items,
+        List.of(some, pairs.block, number, reached).items,
         List.of(kept & ~along, pairs.block, number, first),
         List.of(kept & ~goes_on, pairs.block, number, end - 1),
         List.of(begins & strong[0], pairs.block, number, first),
@@ -242,8 +256,8 @@ def _look(search: Search, blocks: Blocks, pairs: _Pairs, beside: Near | None) ->
     if beside is not None and search.grazing is not None:
         by = beside.of(pairs.block, mi.Bool(True), search.grazing)
     fr = frame(search.source, p, search.tab)
-    open_, far, inner2, start, stop, passes = _from_middle(search, fr, pairs.piece, x, V(normal), radius, by)
-    seen = _Seen(open_, far, mi.Float(inner2), mi.Float(start), mi.Float(stop), passes)
+    open_, weak, far, inner2, start, stop, passes = _from_middle(search, fr, pairs.piece, x, V(normal), radius, by)
+    seen = _Seen(open_, weak, far, mi.Float(inner2), mi.Float(start), mi.Float(stop), passes)
     dr.eval(*seen)
     return seen
 
@@ -259,13 +273,18 @@ def _from_middle(
     piece = tab.piece(i)
     acts = sounds(fr, piece, n)
     clear = dr.mask_t(F)(acts)
+    size = cut_off(fr, piece, k)
     if dr.hint(probe is not None, mode="scalar"):
         assert probe is not None
-        tested = acts & (cut_off(fr, piece, k) > search.share)
+        tested = acts & (size > search.share)
         if tested:
             x = mi.Point3f(piece.middle + constant(tab.types.Vector, tab.centre))
             clear = acts & probe.reaches(x, piece, p, tested)
     far = dr.mask_t(F)(True)
+    room = piece._replace(reach=piece.reach + radius)
+    weak = (cut_off(fr, room, k) < WEAK * search.tolerance) & (
+        dr.squared_norm(fr.foot + fr.z2 * fr.a - piece.middle) > dr.square(REMOTE * radius)
+    )
     inner2, start, stop = F(0), F(0), F(0)
     j = U(piece.first)
     last = tuple(corner(fr, tab.corner(j, 0), k))
@@ -288,48 +307,63 @@ def _from_middle(
         assert beside is not None
         _, v2, close = other_than(beside, piece)
         if close:
-            passes = worth(cut_off(fr, piece, k), v2, search.tolerance)
-    return clear, far, inner2, start, stop, passes
+            passes = worth(size, v2, search.tolerance)
+    return clear, weak, far, inner2, start, stop, passes
 
 
-def _verdicts(search: Search, blocks: Blocks, pairs: _Pairs, tested: Any, passes: Any) -> Any:
-    """Which cells of blocks pieces reach, of those that are `tested`: by a ray to each corner of the cells.
+def _verdicts(search: Search, blocks: Blocks, pairs: _Pairs, tested: Any, seen: _Seen) -> tuple[Any, Any]:
+    """Of pieces that are `tested`, the cells of blocks where to ask for them, and the corners of cells they reach.
 
-    Where corners differ, or lie on another surface, the cell is to be asked, and all of them for what `passes` other
-    silhouettes.
+    By a ray to each corner. A cell is to be asked where its corners differ, if the piece is not too weak for that, or
+    where they lie on another surface; and all of them for what passes other silhouettes.
     """
-    found = dr.zeros(mi.UInt32, len(tested))
+    asked, reached = dr.zeros(mi.UInt32, len(tested)), dr.zeros(mi.UInt32, len(tested))
     pair: Any = dr.compress(tested)
     if len(pair) == 0:
-        return found
+        return asked, reached
     if search.probe is None:
-        dr.scatter(found, mi.UInt32(ALL), pair)
-        return found
-    side = ACROSS + 1
-    index = dr.arange(mi.UInt32, len(pair) * side * side)
-    entry = index // (side * side)
-    place = index - entry * (side * side)
-    reached = _reached(search, search.probe, blocks, pairs, dr.gather(mi.UInt32, pair, entry), place)
-    bits = dr.block_sum(dr.select(reached, mi.UInt32(1) << place, 0), side * side)
+        dr.scatter(asked, mi.UInt32(ALL), pair)
+        return asked, reached
+    corners = LATTICE * LATTICE
+    index = dr.arange(mi.UInt32, len(pair) * corners)
+    entry = index // corners
+    place = index - entry * corners
+    seen_there = _reached(search, search.probe, blocks, pairs, dr.gather(mi.UInt32, pair, entry), place)
+    bits = dr.block_sum(dr.select(seen_there, mi.UInt32(1) << place, 0), corners)
     members = dr.gather(mi.UInt32, blocks.members, dr.gather(mi.UInt32, pairs.block, pair))
-    whole, none = mi.UInt32(0), mi.UInt32(0)
+    weak = dr.gather(mi.Bool, seen.weak, pair)
+    filled, known = _filled(bits, members)
+    ask = mi.UInt32(0)
     for y in range(ACROSS):
         for x in range(ACROSS):
-            cell = 1 << (y * ACROSS + x)
-            corners = sum(1 << ((y + dy) * side + x + dx) for dy in (0, 1) for dx in (0, 1))
-            same = (members & corners) == corners
-            whole |= dr.select(same & ((bits & corners) == corners), cell, 0)
-            none |= dr.select(same & ((bits & corners) == 0), cell, 0)
-    verdict = whole | ((~(whole | none) & (ALL >> CELLS)) << CELLS)
-    dr.scatter(found, dr.select(dr.gather(mi.Bool, passes, pair), ALL, verdict), pair)
-    dr.eval(found)
-    return found
+            own = sum(1 << ((y + dy) * LATTICE + x + dx) for dy in (0, 1) for dx in (0, 1))
+            same = ((bits & own) == own) | ((bits & own) == 0)
+            tells = dr.select(weak, (known & own) == own, same & ((members & own) == own))
+            ask |= dr.select(tells, 0, 1 << (y * ACROSS + x))
+    bits = dr.select(weak, filled, bits)
+    dr.scatter(asked, dr.select(dr.gather(mi.Bool, seen.passes, pair), ALL, ask), pair)
+    dr.scatter(reached, bits, pair)
+    dr.eval(asked, reached)
+    return asked, reached
+
+
+def _filled(bits: Any, members: Any) -> tuple[Any, Any]:
+    """Bits of a lattice's corners that are no members as those of members beside them, and which have any beside."""
+    column = [sum(1 << (row * LATTICE + x) for row in range(LATTICE)) for x in range(LATTICE)]
+    inner = ((1 << LATTICE * LATTICE) - 1) ^ column[0]
+
+    def beside(flags: Any) -> Any:
+        flags = flags | ((flags << 1) & inner) | ((flags >> 1) & (inner >> 1))
+        return flags | (flags << LATTICE) | (flags >> LATTICE)
+
+    known = members | beside(members)
+    return (bits & members) | (beside(bits & members) & ~members), known
 
 
 def _reached(search: Search, probe: Rays, blocks: Blocks, pairs: _Pairs, pair: Any, place: Any) -> Any:
     """Whether pieces reach corners of cells of blocks."""
     tab = search.tab
-    at = dr.gather(mi.UInt32, pairs.block, pair) * (ACROSS + 1) ** 2 + place
+    at = dr.gather(mi.UInt32, pairs.block, pair) * LATTICE**2 + place
     p = dr.gather(type(blocks.lattice), blocks.lattice, at)
     n = dr.gather(type(blocks.normals), blocks.normals, at)
     piece = tab.piece(dr.gather(mi.UInt32, pairs.piece, pair))
@@ -339,14 +373,14 @@ def _reached(search: Search, probe: Rays, blocks: Blocks, pairs: _Pairs, pair: A
     return acts & probe.reaches(x, piece, q + probe.epsilon(q) * n, acts)
 
 
-def _with(total: tuple[Any, ...], chain: Chain) -> tuple[Any, ...]:
-    """A chain added to the five of a sum, the least distances² to P and to the ray, and the segment there.
+def _with(total: tuple[Any, ...], chain: Chain, share: Any) -> tuple[Any, ...]:
+    """A share of a chain added to the five of a sum, the least distances² to P and to the ray, and the segment there.
 
     A plain tuple: what Dr.Jit can carry from turn to turn.
     """
     *sums, receiver2, nearest2, segment = total
     return (
-        *(s + wave for s, wave in zip(sums, chain.wave, strict=True)),
+        *(dr.fma(share, wave, s) for s, wave in zip(sums, chain.wave, strict=True)),
         dr.minimum(receiver2, chain.receiver2),
         dr.minimum(nearest2, chain.distance2),
         dr.select(chain.distance2 < nearest2, chain.segment, segment),
@@ -365,14 +399,16 @@ def listed_sum(
     active, block = receivers.active, receivers.block
     i, end = found.tested.bounds(block, active)
     while active & (i < end):
-        whole = active & found.verdict(i, receivers.cell)
-        if whole:
-            total = _with(total, chain_wave(fr, tab, *tab.range(found.tested.item(i)), k, rule, None, False, whole))
+        share = F(found.share(i, receivers))
+        known = active & (share > 0) & ~found.asks(i, receivers.cell)
+        if known:
+            chain = chain_wave(fr, tab, *tab.range(found.tested.item(i)), k, rule, None, False, known)
+            total = _with(total, chain, share)
         i += 1
     i, end = found.first.bounds(block, active)
     while active & (i < end):
         first, last = found.first.item(i), found.last.item(i)
-        total = _with(total, chain_wave(fr, tab, first, last + 1, k, rule, None, False, active))
+        total = _with(total, chain_wave(fr, tab, first, last + 1, k, rule, None, False, active), F(1))
         i += 1
     real, imag, err_real, err_imag, rounding2, receiver2, nearest2, nearest_segment = total
     i, end = found.begins.bounds(block, active)

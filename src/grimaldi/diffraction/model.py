@@ -52,6 +52,8 @@ class Receivers(NamedTuple):
     active: Any
     block: Any = None  # of `Blocks`, in which each lies; OUTSIDE where it lies in none
     cell: Any = None  # of that block
+    u: Any = None  # where in it, 0..1 along the film's rows and columns
+    v: Any = None
 
 
 OUTSIDE = 0xFFFFFFFF
@@ -68,7 +70,7 @@ class Blocks(NamedTuple):
     active: Any
     lattice: Any  # Float64 (3): receivers at the corners of ACROSS × ACROSS cells of each, row by row
     normals: Any  # as n, there
-    members: Any  # UInt32: a bit for each of those that lies on the same surface
+    members: Any  # UInt32: a bit for each of those that lies on the same surface, or in its plane
     beside: tuple[Any, ...]  # UInt32: blocks around it in the same plane, itself where none is
 
     def of(self, receivers: Receivers, block: Any) -> Any:

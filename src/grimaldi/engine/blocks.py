@@ -47,14 +47,15 @@ class Squares:
 
     def placed(self, x: Any, y: Any, receivers: Receivers) -> Receivers:
         """Receivers seen at places of the film [pixels], with their blocks and cells."""
-        cell = SIDE // ACROSS
-        x = dr.minimum(mi.UInt32(x) // cell, self.across * ACROSS - 1)
-        y = dr.minimum(mi.UInt32(y - self.top) // cell, self.down * ACROSS - 1)
+        u, v = x * (ACROSS / SIDE), (y - self.top) * (ACROSS / SIDE)
+        x = dr.minimum(mi.UInt32(u), self.across * ACROSS - 1)
+        y = dr.minimum(mi.UInt32(v), self.down * ACROSS - 1)
         square = (y // ACROSS) * self.across + x // ACROSS
         first = self.blocks.of(receivers, square)
         second = self.blocks.of(receivers, dr.gather(mi.UInt32, self.second, square))
         block = dr.select(first == OUTSIDE, second, first)
-        return receivers._replace(block=block, cell=(y % ACROSS) * ACROSS + x % ACROSS)
+        cell = (y % ACROSS) * ACROSS + x % ACROSS
+        return receivers._replace(block=block, cell=cell, u=u - mi.Float(x), v=v - mi.Float(y))
 
 
 LATTICE = ACROSS + 1
@@ -194,6 +195,11 @@ def _blocks(group: _Group, beside: list[Integers]) -> Blocks:
         mi.Bool(group.there),
         mi.Point3d(group.lattice.reshape(-1, 3).T),
         mi.Vector3f(group.normals.reshape(-1, 3).T.astype(single)),
-        mi.UInt32(((group.member | (group.bend == 0)[:, None]) << np.arange(LATTICE**2)).sum(1).astype(np.uint32)),
+        _bits(group.member | (group.bend == 0)[:, None]),
         tuple(mi.UInt32(b.astype(np.uint32)) for b in beside),
     )
+
+
+def _bits(flags: NDArray[np.bool_]) -> Any:
+    """Rows of flags (n, m) as numbers (n,)."""
+    return mi.UInt32((flags << np.arange(flags.shape[1])).sum(1).astype(np.uint32))
