@@ -28,7 +28,7 @@ from grimaldi.propagate import Wave, carrier, factor
 from grimaldi.scene.bodies import indices, vertices
 from grimaldi.scene.model import Mesh, Scene, Source
 
-INTERPOLATED = 0.1  # of the tolerance: what pictures may leave to interpolation of M over the film
+INTERPOLATED = 0.1, 5e-4, 0.03  # of a strict tolerance, at most; then of a loose one (`interpolated`)
 
 
 @dataclass(frozen=True)
@@ -170,8 +170,14 @@ def prepare(scene: Scene, settings: Settings) -> Light:
         for wavelength in wavelengths
         for source in sources
     )
-    share = INTERPOLATED * options.tolerance if options.fast and chosen is boundary else 0.0
+    share = interpolated(options.tolerance) if options.fast and chosen is boundary else 0.0
     return Light(scene, hits(scene), beams, keys, share, chosen is not none)
+
+
+def interpolated(tolerance: float) -> float:
+    """|M| that pictures may leave to interpolation over the film: less of loose tolerances, which fringes are below."""
+    strict, most, loose = INTERPOLATED
+    return max(min(strict * tolerance, most), loose * tolerance)
 
 
 class LightOf:

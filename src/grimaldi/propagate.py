@@ -20,9 +20,12 @@ from grimaldi.diffraction.reach import reach
 from grimaldi.diffraction.screen import beyond
 from grimaldi.engine.points import Part, at_points
 from grimaldi.outlines.candidate import least_sag
-from grimaldi.outlines.extract import curve, is_curved, outline
+from grimaldi.outlines.extract import LONGEST, curve, is_curved, outline
 from grimaldi.outlines.model import Outline, Reals
-from grimaldi.scene.model import Scene, Source
+from grimaldi.scene.model import Mesh, Scene, Source
+
+FINELY = 5e-3  # tolerance up to which X→P visibility is told as finely as anywhere along straight edges
+COARSEST = 16.0  # times looser ones and more, at which it is told by the root of that as coarsely
 
 
 class Wave(NamedTuple):
@@ -51,7 +54,8 @@ def factor(scene: Scene, source: Source, model: Model, k: float, options: Option
     if model is none and not scene.screen:  # shadow rays need no outlines
         return none(scene, source, Outline.empty(), k, options)
     sags, detour = _sags(scene, source, phase_allowed(scene, options.tolerance) / k, where)
-    seen = replace(outline(scene, source, sag=sags), detour=detour)
+    longest = LONGEST * min(max(options.tolerance / FINELY, 1.0), COARSEST) ** 0.5
+    seen = replace(outline(scene, source, sag=sags, longest=longest), detour=detour)
     if model is boundary:
         seen = replace(seen, far=reach(scene, source, seen, k, options, where))
     return model(scene, source, seen, k, options)
@@ -105,12 +109,15 @@ def carrier(source: Source, k: float) -> Callable[[Receivers, Factor], Wave]:
 
 
 def _sags(scene: Scene, source: Source, path: float, where: Reals) -> tuple[list[float], float]:
-    """How coarse each curve's polygon may be for Δ to err by `path` at points `where`, and by what it will.
+    """How coarse each curve's polygon may be for Δ to err by `path` at points `where`, and by what it will; meshes: 0.
 
     Across the ray |∇Δ| <= d (1/z1 + 1/z2), d the distance of the outline from it, and never more than 2.
     """
     sags, detour = [], 0.0
     for shape in scene.screen or [body.geometry for body in scene.bodies]:
+        if isinstance(shape, Mesh):
+            sags.append(0.0)
+            continue
         centre, radius = curve(shape)
         if source.position is None:
             assert source.direction is not None

@@ -12,7 +12,7 @@ from grimaldi.scene.model import Scene
 
 T = TypeVar("T")
 
-LONG = 120.0  # all timed runs of a picture [s]
+LONG = 400.0  # all timed runs of a picture [s]
 
 
 def timed(work: Callable[[], T]) -> tuple[T, float]:

@@ -46,7 +46,6 @@ def aligned_empty(count: int, dtype: Any) -> NDArray[Any]:
 def complex_array(real: Any, imag: Any) -> NDArray[np.complex128]:
     """Two Dr.Jit arrays as one NumPy array."""
     dr.eval(real, imag)  # in one kernel
-    dr.eval(real, imag)  # in one kernel
     z = np.empty(len(real), np.complex128)
     z.real, z.imag = real.numpy(), imag.numpy()
     return z

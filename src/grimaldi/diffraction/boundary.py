@@ -17,9 +17,10 @@ import numpy as np
 from grimaldi.diffraction import none
 from grimaldi.diffraction.arrays import Types, types
 from grimaldi.diffraction.curves import curve_error
-from grimaldi.diffraction.edges import Everywhere, Margins, Sum, body_sum, lit_share, planar_sum
+from grimaldi.diffraction.edges import Everywhere, Margins, Sum, body_sum, chain_wave, lit_share, planar_sum, sounds
 from grimaldi.diffraction.frame import Frame, frame
 from grimaldi.diffraction.grazing import chords, near
+from grimaldi.diffraction.hierarchy import least_detour
 from grimaldi.diffraction.lists import Listed, Lists, Search, listed_sum, lists
 from grimaldi.diffraction.model import OUTSIDE, Blocks, Evaluate, Factor, Grouped, Options, Receivers
 from grimaldi.diffraction.occlusion import Rays, rays
@@ -169,20 +170,23 @@ def _rays_alone(scene: Scene, source: Source) -> Evaluate:
     return evaluate
 
 
-def unoccluded(problem: Problem, precision: Types, far: Any) -> Callable[[Any], tuple[Any, Any]]:
-    """(1/2π) Σ ∫ C e^{ikΔ} dφ (real, imaginary) of bodies at points in free space, of what lies at Δ < far alone."""
-    tab = table(problem.outline, problem.source, precision)._replace(far=far)
-    rule = problem.rule()
+def unoccluded(problem: Problem, precision: Types) -> tuple[int, Callable[[Any, Any], tuple[Any, Any, Any]]]:
+    """The number of pieces of the outlines of bodies, and a function of points in free space and pieces i.
 
-    def evaluate(p: Any) -> tuple[Any, Any]:
-        receivers = Receivers(p, dr.zeros(mi.Vector3f, dr.width(p)), dr.mask_t(p.x)(True))
+    It gives Δ at the piece's middle, and (1/2π) ∫ C e^{ikΔ} dφ along it (real, imaginary), nothing in between.
+    """
+    tab = table(problem.outline, problem.source, precision)
+    rule, k = problem.rule(), tab.device(problem.k)
+
+    def evaluate(p: Any, i: Any) -> tuple[Any, Any, Any]:
         fr = frame(problem.source, p, tab)
-        sums, _, _ = body_sum(
-            fr, tab, Everywhere(tab), tab.device(problem.k), rule, 0.0, 1.0, None, None, False, receivers
-        )
-        return sums.real / (2 * np.pi), sums.imag / (2 * np.pi)
+        piece = tab.piece(i)
+        acts = sounds(fr, piece, dr.zeros(type(p), dr.width(p)))
+        wave = chain_wave(fr, tab, piece.first, piece.end, k, rule, None, False, acts).wave
+        scale = dr.select(acts, 0.5 / np.pi, 0)
+        return least_detour(fr, piece.middle, 0), scale * wave.real, scale * wave.imag
 
-    return evaluate
+    return int(tab.n_pieces[0]), evaluate
 
 
 def _bodies(problem: Problem, precision: Types) -> Grouped:

@@ -234,6 +234,12 @@ class Walk(Protocol):
         ...
 
 
+def taper(x: Any) -> Any:
+    """1 up to x = 1/2, going smoothly to 0 at 1: a sharp end would send a wave of its own."""
+    t = dr.clip(2 - 2 * x, 0, 1)
+    return t * t * (3 - 2 * t)
+
+
 class Everywhere(NamedTuple):
     """All pieces that are near enough to matter, by the table's hierarchy."""
 
@@ -258,9 +264,8 @@ class Everywhere(NamedTuple):
         return self.table.tree.after(i, inside)
 
     def weight(self, fr: Frame, piece: Piece) -> Any:
-        """1 near the ray, going smoothly to 0 where Δ is `far`: a sharp end would send a wave of its own."""
-        t = dr.clip(2 - 2 * dr.maximum(least_detour(fr, piece.middle, 0), 0) / self.table.far, 0, 1)
-        return t * t * (3 - 2 * t)
+        """By how near the ray it lies."""
+        return taper(least_detour(fr, piece.middle, 0) / self.table.far)
 
 
 def closest(fr: Frame, seg: Segment, ln: Line) -> Any:

@@ -5,8 +5,9 @@ from __future__ import annotations
 import drjit as dr
 import numpy as np
 
-from grimaldi.diffraction.arrays import types
+from grimaldi.diffraction.arrays import on_device, types
 from grimaldi.diffraction.boundary import Problem, unoccluded
+from grimaldi.diffraction.edges import taper
 from grimaldi.diffraction.model import Options
 from grimaldi.diffraction.table import MANY, cut
 from grimaldi.outlines.model import Outline, Reals
@@ -14,7 +15,7 @@ from grimaldi.scene.model import Scene, Source
 
 POINTS = 64  # where it is measured
 LEFT_OUT = 0.3  # of the tolerance, at most at these points
-LADDER = 2.0 ** np.arange(5, 15)  # of kΔ
+LADDER = np.exp2(np.arange(5.0, 15.0))  # of kΔ
 
 
 def reach(scene: Scene, source: Source, outline: Outline, k: float, options: Options, where: Reals) -> float:
@@ -26,14 +27,32 @@ def reach(scene: Scene, source: Source, outline: Outline, k: float, options: Opt
     if scene.screen or len(where) == 0 or len(outline) < MANY or len(cut(outline)) < MANY:
         return np.inf
     points = where[np.linspace(0, len(where) - 1, min(POINTS, len(where))).astype(int)]
-    rungs = np.append(LADDER / k, 1e30)
-    double = types(double=True)
-    asked, far = np.repeat(points, len(rungs), axis=0), np.tile(rungs, len(points))
-    problem = Problem(scene, source, outline, k, options, None)
-    sums = unoccluded(problem, double, double.buffer(far))
-    real, imag = sums(double.Vector(*(double.buffer(asked[:, i]) for i in range(3))))
-    dr.eval(real, imag)
-    M = (real.numpy() + 1j * imag.numpy()).reshape(len(points), len(rungs))
-    left_out = np.abs(M - M[:, -1:]).max(axis=0)
+    rungs = LADDER / k
+    left_out = _left_out(Problem(scene, source, outline, k, options, None), points, rungs)
     too_near = np.flatnonzero(~(left_out <= LEFT_OUT * options.tolerance))
     return float(rungs[too_near[-1] + 1]) if len(too_near) and too_near[-1] + 1 < len(LADDER) else np.inf
+
+
+def _left_out(problem: Problem, points: Reals, rungs: Reals) -> Reals:
+    """The largest |M| (m,) at points (n, 3) of what is left out beyond each of the Δ `rungs` (m,), an octave apart.
+
+    A piece's wave is left out as a whole at rungs before its Δ, in part at the next one, and not at all at others.
+    """
+    double = types(double=True)
+    number, wave = unoccluded(problem, double)
+    piece = dr.arange(dr.uint32_array_t(double.Float), number)
+    ends = double.buffer(np.append(rungs, np.inf))
+    most = np.zeros(len(rungs))
+    for point in points:
+        delta, real, imag = wave(double.Vector(*(on_device(double.Float, x) for x in point)), piece)
+        octave = dr.clip(dr.ceil(dr.log2(dr.maximum(delta, 1e-300) / rungs[0])), 0, len(rungs))
+        part = 1 - taper(delta / dr.gather(double.Float, ends, type(piece)(octave)))
+        dr.eval(real, imag, octave, part)
+        M, rung = real.numpy() + 1j * imag.numpy(), octave.numpy().astype(np.int64)
+        whole, partly = (
+            np.bincount(rung, wave.real, len(rungs) + 1) + 1j * np.bincount(rung, wave.imag, len(rungs) + 1)
+            for wave in (M, M * part.numpy())
+        )
+        beyond = np.cumsum(whole[:0:-1])[::-1]
+        most = np.maximum(most, np.abs(beyond + partly[:-1]))
+    return most

@@ -107,17 +107,22 @@ def cut(outline: Outline) -> NDArray[np.int64]:
     np.minimum.at(low, of, outline.start)
     np.maximum.at(high, of, outline.start)
     most = (1 / 64 * np.linalg.norm(high - low, axis=1))[of]
-    lengths = np.linalg.norm(outline.end - outline.start, axis=1)
+    n = len(outline)
+    along = np.append(0, np.cumsum(np.linalg.norm(outline.end - outline.start, axis=1)))
     inner = np.isfinite(outline.behind)
-    new = np.append(True, (outline.chain[1:] != outline.chain[:-1]) | (inner[1:] != inner[:-1]))
-    first, in_piece, total = [], 0, 0.0
-    for i, (begins, length, longest) in enumerate(zip(new.tolist(), lengths.tolist(), most.tolist(), strict=True)):
-        if begins or in_piece >= LONGEST_PIECE or total + length > longest:
-            first.append(i)
-            in_piece, total = 0, 0.0
-        in_piece += 1
-        total += length
-    return np.array([*first, len(lengths)], np.int64)
+    new = np.append(True, (outline.chain[1:] != outline.chain[:-1]) | (inner[1:] != inner[:-1]))[:n]
+    begin = np.flatnonzero(new)
+    stop = np.repeat(np.append(begin[1:], n), np.diff(np.append(begin, n)))
+    # where a piece that begins at each segment would end: all chains walk on at once
+    index = np.arange(n)
+    end = np.searchsorted(along, along[:-1] + most, side="right") - 1
+    end = np.minimum(np.clip(end, index + 1, index + LONGEST_PIECE), stop)
+    first = np.zeros(n + 1, bool)
+    first[n] = True
+    while len(begin):
+        first[begin] = True
+        begin = end[begin[end[begin] < stop[begin]]]
+    return np.flatnonzero(first)
 
 
 def needs_double(outline: Outline, k: float, options: Options) -> bool:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from grimaldi.diffraction.arrays import on_device, types
 from grimaldi.scene.bodies import indices, vertices
 from grimaldi.scene.model import Cylinder, Disk, Mesh, Scene, Sphere
+from grimaldi.scene.triangles import areas
 
 Reals = NDArray[np.float64]
 
@@ -66,15 +67,17 @@ def hits(scene: Scene) -> Hits:
     index = indices(scene.mitsuba)
     shapes = np.zeros((int(index.max(initial=0)) + 1, 4))
     planes, quadrics = [np.zeros((1, 4))], [np.zeros((1, 3, 4))]  # the device cannot gather from nothing
+    flat = 1
     for i, surface in zip(index, scene.surfaces, strict=True):
         if surface is None:
             continue
         reach = np.abs(vertices(surface)).max()
         if isinstance(surface, (Mesh, Disk)):
-            shapes[i] = FLAT, sum(map(len, planes)), isinstance(surface, Mesh), reach
+            shapes[i] = FLAT, flat, isinstance(surface, Mesh), reach
             planes.append(_planes(surface))
+            flat += len(planes[-1])
         else:
-            shapes[i] = CURVED, sum(map(len, quadrics)), 0, reach
+            shapes[i] = CURVED, len(quadrics), 0, reach
             quadrics.append(_quadric(surface))
     buffer = types(double=True).buffer
     return Hits(
@@ -88,14 +91,13 @@ def hits(scene: Scene) -> Hits:
 def _planes(surface: Mesh | Disk) -> Reals:
     """Unit normal and h (m, 4) of each face; NaN where its corners lie in line."""
     if isinstance(surface, Mesh):
-        origin, X, Y = np.moveaxis(surface.vertices[surface.faces], 1, 0)
-        n = np.cross(X - origin, Y - origin)
+        origin, X, Y = (surface.vertices[corner] for corner in surface.faces.T)
     else:
         X, Y, _, origin = surface.to_world[:3].T[:, None]
-        n = np.cross(X, Y)
-    with np.errstate(invalid="ignore"):
-        n = n / np.linalg.norm(n, axis=1, keepdims=True)
-    return np.concatenate([n, (n * origin).sum(axis=1, keepdims=True)], axis=1)
+        X, Y = origin + X, origin + Y
+    area, n = areas(origin, X, Y)
+    h = np.where(area.any(axis=1), (n * origin).sum(axis=1), np.nan)
+    return np.concatenate([n, h[:, None]], axis=1)
 
 
 def _quadric(surface: Sphere | Cylinder) -> Reals:

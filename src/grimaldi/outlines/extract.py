@@ -27,7 +27,7 @@ DEFAULT_SAG = 1e-4  # of a curve's size, where no wavelength sets it
 BESIDE = 1e-6  # of the coordinates: how far Float32 vertices of a wall may lie beside it
 
 
-def outline(scene: Scene, source: Source, *, sag: Sequence[float] | None = None) -> Outline:
+def outline(scene: Scene, source: Source, *, sag: Sequence[float] | None = None, longest: float = LONGEST) -> Outline:
     """The lit outlines that `source` sees.
 
     Args:
@@ -35,6 +35,7 @@ def outline(scene: Scene, source: Source, *, sag: Sequence[float] | None = None)
         source: one of its sources.
         sag: for each of the scene's bodies, or of its planar outlines, how far the polygon of a smooth outline
             may lie from it [scene units]; 1e-4 of its size by default.
+        longest: no segment of a straight edge is longer than this, of its body's extent.
 
     Returns:
         All lit silhouettes over the full sphere of directions, also those in front of other lit parts
@@ -43,10 +44,10 @@ def outline(scene: Scene, source: Source, *, sag: Sequence[float] | None = None)
     if scene.screen:
         return _planar(scene, source, sag or [DEFAULT_SAG * curve(shape)[1] for shape in scene.screen])
     sag = tuple(sag or default_sags(scene.bodies))
-    return once(scene, ("outline", source, sag), lambda: _bodies(scene, source, sag))
+    return once(scene, ("outline", source, sag, longest), lambda: _bodies(scene, source, sag, longest))
 
 
-def _bodies(scene: Scene, source: Source, sag: Sequence[float]) -> Outline:
+def _bodies(scene: Scene, source: Source, sag: Sequence[float], longest: float) -> Outline:
     soup = soup_of(scene)
     edges, body = edges_of(scene, source, sag)
     if not len(body):
@@ -55,8 +56,8 @@ def _bodies(scene: Scene, source: Source, sag: Sequence[float]) -> Outline:
     lit = lit_parts(sight)
     coarsest = max((s for b, s in zip(scene.bodies, sag, strict=True) if is_curved(b.geometry)), default=0.0)
     radius = curvature.radii(scene.bodies, soup, source, edges, body)
-    longest = LONGEST * _extents(edges.start, body)
-    return assemble(edges, body, lit, source, coarsest, radius=radius, longest=longest, sight=sight)
+    most = longest * _extents(edges.start, body)
+    return assemble(edges, body, lit, source, coarsest, radius=radius, longest=most, sight=sight)
 
 
 def soup_of(scene: Scene) -> Soup:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from grimaldi.scene.model import Facets, Mesh, Vector
-from grimaldi.scene.triangles import merged_points
+from grimaldi.scene.triangles import areas, merged_points
 
 FLAT = 2e-7  # of the coordinates: how far corners in Float32 lie off the plane or line that they were meant for
 FEW = 16  # triangles in one plane, that are not worth putting together
@@ -56,16 +56,9 @@ def facets(mesh: Mesh) -> Facets | None:
 
 def _is_curved(mesh: Mesh) -> bool:
     """Whether there are too many directions of faces for much of it to be flat: a quick look."""
-    _, normal = _normals(*(mesh.vertices[mesh.faces[:, i]] for i in range(3)))
+    _, normal = areas(*(mesh.vertices[mesh.faces[:, i]] for i in range(3)))
     step = np.round(NORMALS * (normal + 1)).astype(np.int64)
     return len(np.unique((step[:, 0] << 20) + (step[:, 1] << 10) + step[:, 2])) > len(normal) / WORTH
-
-
-def _normals(a: Vector, b: Vector, c: Vector) -> tuple[Vector, Vector]:
-    """Of triangles twice the area vectors (m, 3), and those as unit vectors."""
-    (ux, uy, uz), (vx, vy, vz) = (b - a).T, (c - a).T
-    area = np.stack([uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx], axis=1)
-    return area, area / np.maximum(np.linalg.norm(area, axis=1, keepdims=True), 1e-300)
 
 
 def _plane_parts(x: Vector, corners: Integers, off: float) -> tuple[_Sides, Flags]:
@@ -88,7 +81,7 @@ def _plane_parts(x: Vector, corners: Integers, off: float) -> tuple[_Sides, Flag
     twin[one], twin[two] = two, one
 
     a, b, c = (x[corners[:, i]] for i in range(3))
-    area, unit = _normals(a, b, c)
+    area, unit = areas(a, b, c)
     f, g = one // 3, two // 3
     apex = corners.ravel()[3 * g + (two + 2) % 3]
     level = np.abs(np.einsum("ij,ij->i", x[apex] - a[f], unit[f])) <= off
@@ -203,7 +196,7 @@ def _triangulated(
     broken = []
     for facet, i, j in zip(part.tolist(), first, last, strict=True):
         own = corners[side[i:j] // 3]
-        area, _ = _normals(*(x[own[:, corner]] for corner in range(3)))
+        area, _ = areas(*(x[own[:, corner]] for corner in range(3)))
         found = _filled(x, start[i:j], end[i:j], area.sum(0))
         if found is None:
             broken.append(facet)

@@ -101,3 +101,12 @@ def merged_points(points: NDArray[np.float64], owner: NDArray[np.int64]) -> tupl
     number = np.empty(len(owner), np.int64)
     number[order] = np.cumsum(leads) - 1
     return order[leads], number
+
+
+def areas(
+    a: NDArray[np.float64], b: NDArray[np.float64], c: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Of triangles between corners (m, 3) twice the area vectors (m, 3), and those as unit vectors, 0 where no area."""
+    (ux, uy, uz), (vx, vy, vz) = (b - a).T, (c - a).T
+    area = np.stack([uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx], axis=1)
+    return area, area / np.maximum(np.linalg.norm(area, axis=1, keepdims=True), 1e-300)
