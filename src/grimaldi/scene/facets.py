@@ -68,42 +68,52 @@ def _plane_parts(x: Vector, corners: Integers, off: float) -> tuple[_Sides, Flag
 
     m = len(corners)
     tail, head = corners.ravel(), np.roll(corners, -1, axis=1).ravel()
-    key = np.minimum(tail, head) * len(x) + np.maximum(tail, head)
-    order = np.argsort(key, kind="stable")
-    first = np.flatnonzero(np.append(True, np.diff(key[order]) != 0))
-    count = np.diff(np.append(first, len(key)))
-    group = np.empty(len(key), np.int64)
-    group[order] = np.repeat(np.arange(len(first)), count)
-    one, two = order[first[count == 2]], order[first[count == 2] + 1]
-    opposite = tail[one] == head[two]
-    one, two = one[opposite], two[opposite]
-    twin = np.full(len(key), -1)
-    twin[one], twin[two] = two, one
-
-    a, b, c = (x[corners[:, i]] for i in range(3))
-    area, unit = areas(a, b, c)
+    group, twin = _paired(tail, head, len(x))
+    one = np.flatnonzero(twin > np.arange(len(twin)))
+    two = twin[one]
     f, g = one // 3, two // 3
-    apex = corners.ravel()[3 * g + (two + 2) % 3]
-    level = np.abs(np.einsum("ij,ij->i", x[apex] - a[f], unit[f])) <= off
+    _, unit = areas(*(x[corners[:, i]] for i in range(3)))
+    apex = corners[g, (two + 2) % 3]
+    level = np.abs(np.einsum("ij,ij->i", x[apex] - x[corners[f, 0]], unit[f])) <= off
     level &= np.einsum("ij,ij->i", unit[f], unit[g]) > 0
     joins = coo_array((np.ones(level.sum(), bool), (f[level], g[level])), shape=(m, m))
     parts, part = connected_components(joins, directed=False)
 
-    # a surface that curves little from face to face is no plane for that
-    size = np.bincount(part)
-    normal = np.stack([np.bincount(part, area[:, i]) for i in range(3)], axis=1)
-    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
-    middle = np.stack([np.bincount(part, (a + b + c)[:, i]) for i in range(3)], axis=1) / (3 * size[:, None])
-    height = np.max([np.abs(((p - middle[part]) * normal[part]).sum(1)) for p in (a, b, c)], axis=0)
-    most = np.zeros(parts)
-    np.maximum.at(most, part, height)
-    turned = np.zeros(parts, bool)
-    turned[part[(unit * normal[part]).sum(1) <= 0]] = True
-    flat = (size >= FEW) & (most <= off) & ~turned
+    flat = _is_plane(x, corners, part, parts, off) & (np.bincount(part) >= FEW)
     alone = ~flat[part]
     part[alone] = parts + np.arange(np.count_nonzero(alone))  # no triangle of these is any other's business
     flat = np.append(flat, np.zeros(np.count_nonzero(alone), bool))
     return _Sides(tail, head, np.repeat(part, 3), group, twin), flat
+
+
+def _paired(tail: Integers, head: Integers, n: int) -> tuple[Integers, Integers]:
+    """`group` and `twin` of sides between n corners."""
+    key = np.minimum(tail, head) * n + np.maximum(tail, head)
+    order = np.argsort(key, kind="stable")
+    first = np.flatnonzero(np.append(True, np.diff(key[order]) != 0))
+    count = np.diff(np.append(first, len(key)))
+    group, twin = np.empty(len(key), np.int64), np.full(len(key), -1)
+    group[order] = np.repeat(np.arange(len(first)), count)
+    one, two = order[first[count == 2]], order[first[count == 2] + 1]
+    opposite = tail[one] == head[two]
+    one, two = one[opposite], two[opposite]
+    twin[one], twin[two] = two, one
+    return group, twin
+
+
+def _is_plane(x: Vector, corners: Integers, part: Integers, parts: int, off: float) -> Flags:
+    """Whether parts of a surface are plane as wholes: one that curves little from face to face is not."""
+    own = [x[corners[:, i]] for i in range(3)]
+    area, unit = areas(*own)
+    normal = np.stack([np.bincount(part, column) for column in area.T], axis=1)
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
+    middle = np.stack([np.bincount(part, column) for column in np.sum(own, axis=0).T], axis=1)
+    level = (normal * middle).sum(1) / (3 * np.bincount(part))
+    height = np.max([np.abs((p * normal[part]).sum(1) - level[part]) for p in own], axis=0)
+    most = np.zeros(parts)
+    np.maximum.at(most, part, height)
+    turned = np.bincount(part, (unit * normal[part]).sum(1) <= 0) > 0
+    return (most <= off) & ~turned
 
 
 def _borders(x: Vector, sides: _Sides, flat: Flags, off: float) -> tuple[Integers, Integers, Integers]:
