@@ -13,6 +13,7 @@ from grimaldi.diffraction.boundary import boundary
 from grimaldi.diffraction.curves import phase_allowed
 from grimaldi.diffraction.frame import incident
 from grimaldi.diffraction.fresnel_plane import fresnel_plane
+from grimaldi.diffraction.hierarchy import morton
 from grimaldi.diffraction.model import Evaluate, Factor, Model, Options, Receivers
 from grimaldi.diffraction.none import none
 from grimaldi.diffraction.planes import planes
@@ -79,10 +80,10 @@ def propagate_all(
                 (part,) = at_points(_wave(source, k, evaluate), scene, source, p, block=len(p))
                 yield part._replace(which=group.which)
                 left[group.which] = False
-    if left.all():
-        yield from at_points(propagate(scene, source, model, k, options, points), scene, source, points)
-    elif left.any():
-        rest = np.flatnonzero(left)
+    rest = np.flatnonzero(left)
+    if len(rest):
+        if not scene.before(source).screen:  # rays to neighbours go the same ways
+            rest = rest[np.argsort(morton(points[rest]), kind="stable")]
         wave = propagate(scene, source, model, k, options, points[rest])
         for part in at_points(wave, scene, source, points[rest]):
             yield part._replace(which=rest[part.which])

@@ -17,9 +17,20 @@ import numpy as np
 from grimaldi.diffraction import none
 from grimaldi.diffraction.arrays import Types, types
 from grimaldi.diffraction.curves import curve_error
-from grimaldi.diffraction.edges import Everywhere, Margins, Sum, body_sum, chain_wave, lit_share, planar_sum, sounds
+from grimaldi.diffraction.edges import (
+    Everywhere,
+    Margins,
+    Nearest,
+    Sum,
+    Walk,
+    body_sum,
+    chain_wave,
+    lit_share,
+    planar_sum,
+    sounds,
+)
 from grimaldi.diffraction.frame import Frame, frame
-from grimaldi.diffraction.grazing import chords, near
+from grimaldi.diffraction.grazing import Near, chords, near
 from grimaldi.diffraction.hierarchy import least_detour
 from grimaldi.diffraction.lists import Listed, Lists, Search, listed_sum, lists
 from grimaldi.diffraction.model import OUTSIDE, Blocks, Evaluate, Factor, Grouped, Options, Receivers
@@ -97,7 +108,7 @@ class _Either(NamedTuple):
         found = self.single.lists(blocks)
         if found is None:
             return self
-        return self._replace(single=partial(self.single, found=found), double=partial(self.double, found=found))
+        return self._replace(single=partial(self.single.listed, found), double=partial(self.double.listed, found))
 
 
 @dr.syntax
@@ -206,34 +217,34 @@ class _Bodies:
         self.share = UNASKED * tolerance / self.items
         self.grazing = None if grazed is None else chords(grazed, self.tab.centre, precision)
 
-    def __call__(self, receivers: Receivers, found: Lists | None = None) -> Factor:
-        _, source, _, k, options, _ = self.problem
-        tab, rule = self.tab, self.rule
-        if found is not None:
-            receivers = receivers._replace(active=receivers.active & (receivers.block != OUTSIDE))
-        fr = frame(source, receivers.p, tab)
-        if found is not None:
-            beside = found.near(receivers, self.grazing)
-        else:
-            beside = None if self.grazing is None else near(fr, self.grazing, tab.device(k), receivers)
-        sums = body_sum(
-            fr,
-            tab,
-            Everywhere(tab) if found is None else Listed(found, receivers.cell),
-            tab.device(k),
-            rule,
-            self.share if found is None else 0.0,
-            options.tolerance,
-            self.probe,
-            beside,
-            options.rim == "smooth",
-            receivers,
+    def __call__(self, receivers: Receivers) -> Factor:
+        """By all pieces."""
+        fr = frame(self.problem.source, receivers.p, self.tab)
+        beside = None if self.grazing is None else near(fr, self.grazing, self.tab.device(self.problem.k), receivers)
+        return self._factor(fr, receivers, self._sum(fr, Everywhere(self.tab), self.share, beside, receivers))
+
+    def listed(self, found: Lists, receivers: Receivers) -> Factor:
+        """By the lists of the receivers' blocks."""
+        receivers = receivers._replace(active=receivers.active & (receivers.block != OUTSIDE))
+        fr = frame(self.problem.source, receivers.p, self.tab)
+        beside = found.near(receivers, self.grazing)
+        tested = self._sum(fr, Listed(found, receivers.cell), 0.0, beside, receivers)
+        k = self.tab.device(self.problem.k)
+        return self._factor(fr, receivers, listed_sum(fr, self.tab, found, k, self.rule, tested, receivers))
+
+    def _sum(
+        self, fr: Frame, walk: Walk, share: float, beside: Near | None, receivers: Receivers
+    ) -> tuple[Sum, Nearest, Margins]:
+        options = self.problem.options
+        k, smooth = self.tab.device(self.problem.k), options.rim == "smooth"
+        return body_sum(
+            fr, self.tab, walk, k, self.rule, share, options.tolerance, self.probe, beside, smooth, receivers
         )
-        if found is not None:
-            sums = listed_sum(fr, tab, found, tab.device(k), rule, sums, receivers)
-        sums, nearest, margins = sums
-        lit = lit_share(fr, tab, nearest, self.rays, receivers)
-        return _factor(tab, rule, fr, k, margins, lit, 1, sums)
+
+    def _factor(self, fr: Frame, receivers: Receivers, found: tuple[Sum, Nearest, Margins]) -> Factor:
+        sums, nearest, margins = found
+        lit = lit_share(fr, self.tab, nearest, self.rays, receivers)
+        return _factor(self.tab, self.rule, fr, self.problem.k, margins, lit, 1, sums)
 
     @property
     def items(self) -> int:
@@ -248,7 +259,7 @@ class _Bodies:
     def among(self, blocks: Blocks) -> Evaluate:
         """By lists of what acts on the blocks."""
         found = self.lists(blocks)
-        return self if found is None else partial(self, found=found)
+        return self if found is None else partial(self.listed, found)
 
     def lists(self, blocks: Blocks) -> Lists | None:
         """What acts on each block; None where ends of runs, or what a few rays tell of a block, are not enough."""

@@ -28,21 +28,17 @@ class Part(NamedTuple):
 def at_points(
     wave: Callable[[Receivers], Wave], scene: Scene, source: Source, points: NDArray[np.float64], block: int = BLOCK
 ) -> Iterator[Part]:
-    """One source's wave at points (n, 3), `block` of them after the other; nobody may write to them.
-
-    In each block neighbours stand together: their rays go the same ways.
-    """
+    """One source's wave at points (n, 3), `block` of them after the other; nobody may write to them."""
     import drjit as dr
 
     from grimaldi.diffraction.arrays import complex_array, types
-    from grimaldi.diffraction.hierarchy import morton
     from grimaldi.diffraction.model import Receivers
     from grimaldi.diffraction.occlusion import surface_normals
 
     double = types(double=True)
     normals = surface_normals(scene, source)
     for first in range(0, len(points), block):
-        which = first + np.argsort(morton(points[first : first + block]), kind="stable")
+        which = slice(first, min(first + block, len(points)))
         p = double.Vector(*(double.taken(points[which, i]) for i in range(3)))
         n = normals(p)
         u = wave(Receivers(p, n, dr.mask_t(p.x)(True)))
