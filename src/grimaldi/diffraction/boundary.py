@@ -214,13 +214,14 @@ class _Bodies:
         self.rule = problem.rule()
         self.rays = rays(scene, source, outline.sag)
         self.tab = table(outline, source, precision, angle=AS_ONE * tolerance)
+        self.k = self.tab.device(problem.k)
         self.share = UNASKED * tolerance / self.items
         self.grazing = None if grazed is None else chords(grazed, self.tab.centre, precision)
 
     def __call__(self, receivers: Receivers) -> Factor:
         """By all pieces."""
         fr = frame(self.problem.source, receivers.p, self.tab)
-        beside = None if self.grazing is None else near(fr, self.grazing, self.tab.device(self.problem.k), receivers)
+        beside = None if self.grazing is None else near(fr, self.grazing, self.k, receivers)
         return self._factor(fr, receivers, self._sum(fr, Everywhere(self.tab), self.share, beside, receivers))
 
     def listed(self, found: Lists, receivers: Receivers) -> Factor:
@@ -229,16 +230,15 @@ class _Bodies:
         fr = frame(self.problem.source, receivers.p, self.tab)
         beside = found.near(receivers, self.grazing)
         tested = self._sum(fr, Listed(found, receivers.cell), 0.0, beside, receivers)
-        k = self.tab.device(self.problem.k)
-        return self._factor(fr, receivers, listed_sum(fr, self.tab, found, k, self.rule, tested, receivers))
+        return self._factor(fr, receivers, listed_sum(fr, self.tab, found, self.k, self.rule, tested, receivers))
 
     def _sum(
         self, fr: Frame, walk: Walk, share: float, beside: Near | None, receivers: Receivers
     ) -> tuple[Sum, Nearest, Margins]:
         options = self.problem.options
-        k, smooth = self.tab.device(self.problem.k), options.rim == "smooth"
+        smooth = options.rim == "smooth"
         return body_sum(
-            fr, self.tab, walk, k, self.rule, share, options.tolerance, self.probe, beside, smooth, receivers
+            fr, self.tab, walk, self.k, self.rule, share, options.tolerance, self.probe, beside, smooth, receivers
         )
 
     def _factor(self, fr: Frame, receivers: Receivers, found: tuple[Sum, Nearest, Margins]) -> Factor:
@@ -263,9 +263,9 @@ class _Bodies:
 
     def lists(self, blocks: Blocks) -> Lists | None:
         """What acts on each block; None where ends of runs, or what a few rays tell of a block, are not enough."""
-        _, source, _, k, options, _ = self.problem
-        tab, corners = self.tab, self.rule.corners
+        options, corners = self.problem.options, self.rule.corners
         if corners is None or options.rim == "smooth" or options.tolerance < LOOSE:
             return None
-        search = Search(source, tab, tab.device(k), corners, options.tolerance, self.share, self.probe, self.grazing)
+        source, tolerance = self.problem.source, options.tolerance
+        search = Search(source, self.tab, self.k, corners, tolerance, self.share, self.probe, self.grazing)
         return lists(search, blocks)

@@ -18,7 +18,7 @@ from grimaldi.diffraction.edges import Chain, Margins, Nearest, Sum, chain_wave,
 from grimaldi.diffraction.frame import Frame, constant, frame
 from grimaldi.diffraction.grazing import Chords, Near, near, other_than, worth
 from grimaldi.diffraction.hierarchy import least_detour
-from grimaldi.diffraction.model import ACROSS, Blocks, Receivers
+from grimaldi.diffraction.model import ACROSS, LATTICE, Blocks, Receivers
 from grimaldi.diffraction.occlusion import Rays
 from grimaldi.diffraction.segment import Corners, Rule
 from grimaldi.diffraction.table import Piece, Table
@@ -30,7 +30,6 @@ CORNER = 0.02  # of the tolerance: |M| of a corner that is left out
 FINE = 1 << 16  # parts of its square, in which it is counted: sums of whole numbers are the same in any order
 WEAK = 0.1  # of the tolerance: |M| of an end that grows evenly between corners of cells which it reaches or not
 REMOTE = 1.5  # radii of a block, that such a piece is away from it at least
-LATTICE = ACROSS + 1
 ALL = (1 << ACROSS * ACROSS) - 1  # cells
 UNTESTED = 0.1  # of the tolerance: |M| of an end that reaches a block or not as a whole, by what its middle says
 
@@ -46,10 +45,7 @@ class List(NamedTuple):
         """The `chosen` of items, which lie in order of their blocks."""
         count = dr.zeros(mi.UInt32, blocks + 1)
         dr.scatter_add(count, mi.UInt32(1), block + 1, chosen)
-        index: Any = dr.compress(chosen)
-        if len(index) == 0:
-            index = dr.zeros(mi.UInt32, 1)  # an array that nothing can be gathered from stops a kernel
-        return List(dr.cumsum(count), dr.gather(type(items), items, index))
+        return List(dr.cumsum(count), dr.gather(type(items), items, _places(chosen)))
 
     def item(self, i: Any) -> Any:
         """What stands at a place."""
@@ -58,6 +54,13 @@ class List(NamedTuple):
     def bounds(self, block: Any, active: Any) -> tuple[Any, Any]:
         """The first item of a block, and the one after its last."""
         return dr.gather(mi.UInt32, self.begin, block, active), dr.gather(mi.UInt32, self.begin, block + 1, active)
+
+
+def _places(flags: Any) -> Any:
+    """Where flags are set; a place too many where none is."""
+    found: Any = dr.compress(flags)
+    # an array that nothing can be gathered from stops a kernel
+    return found if len(found) else dr.zeros(mi.UInt32, 1)
 
 
 class Lists(NamedTuple):
@@ -196,11 +199,12 @@ def lists(search: Search, blocks: Blocks) -> Lists:
     first, end = tab.range(pairs.piece)
     asked, reached = _verdicts(search, blocks, pairs, tested, seen)
     some = (asked | reached) != 0
+    place = _places(some)
     dr.eval(begins, stops, first, end, goes_on, some)
     return Lists(
         List.of(some, pairs.block, number, pairs.piece),
-        List.of(some, pairs.block, number, asked).items,
-        List.of(some, pairs.block, number, reached).items,
+        dr.gather(mi.UInt32, asked, place),
+        dr.gather(mi.UInt32, reached, place),
         List.of(kept & ~along, pairs.block, number, first),
         List.of(kept & ~goes_on, pairs.block, number, end - 1),
         List.of(begins & strong[0], pairs.block, number, first),
@@ -224,9 +228,7 @@ def _pairs(search: Search, blocks: Blocks, n: int) -> _Pairs:
     acts = dr.gather(mi.Bool, blocks.active, block)
     acts &= least_detour(fr, piece.middle, piece.reach + radius) <= tab.far
     acts &= dr.select(bend == 0, sounds(fr, piece, normal), dr.dot(normal, d) < radius + bend * dr.norm(d))
-    found: Any = dr.compress(acts)
-    if len(found) == 0:
-        found = dr.zeros(mi.UInt32, 1)  # one more than needed does no harm
+    found = _places(acts)
     block = found // n
     dr.eval(found, block)
     return _Pairs(block, found - block * n, found)

@@ -58,6 +58,7 @@ class Receivers(NamedTuple):
 
 OUTSIDE = 0xFFFFFFFF
 ACROSS = 4  # cells across a block
+LATTICE = ACROSS + 1  # corners of those
 
 
 class Blocks(NamedTuple):

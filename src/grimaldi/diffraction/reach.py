@@ -50,8 +50,8 @@ def _left_out(problem: Problem, points: Reals, rungs: Reals) -> Reals:
         dr.eval(real, imag, octave, part)
         M, rung = real.numpy() + 1j * imag.numpy(), octave.numpy().astype(np.int64)
         whole, partly = (
-            np.bincount(rung, wave.real, len(rungs) + 1) + 1j * np.bincount(rung, wave.imag, len(rungs) + 1)
-            for wave in (M, M * part.numpy())
+            np.bincount(rung, m.real, len(rungs) + 1) + 1j * np.bincount(rung, m.imag, len(rungs) + 1)
+            for m in (M, M * part.numpy())
         )
         beyond = np.cumsum(whole[:0:-1])[::-1]
         most = np.maximum(most, np.abs(beyond + partly[:-1]))

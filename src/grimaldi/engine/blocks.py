@@ -11,7 +11,7 @@ import mitsuba
 import numpy as np
 from numpy.typing import NDArray
 
-from grimaldi.diffraction.model import ACROSS, OUTSIDE, Blocks, Receivers
+from grimaldi.diffraction.model import ACROSS, LATTICE, OUTSIDE, Blocks, Receivers
 
 mi: Any = mitsuba  # the stubs refuse numbers where arrays are asked for
 
@@ -58,7 +58,6 @@ class Squares:
         return receivers._replace(block=block, cell=cell, u=u - mi.Float(x), v=v - mi.Float(y))
 
 
-LATTICE = ACROSS + 1
 MIDDLE = LATTICE * LATTICE // 2
 
 

@@ -16,6 +16,7 @@ from grimaldi.outlines.candidate import EDGE_ON, Candidates, edge_on, facing
 from grimaldi.outlines.model import Integers, Reals
 from grimaldi.outlines.soup import Soup
 from grimaldi.scene.model import Source
+from grimaldi.scene.triangles import areas
 
 PART = 1 << 15  # triangles at once: what fits the cache
 
@@ -115,7 +116,7 @@ def normals_beside(
     face1, face2 (n,): triangles of the soup that meet at the edges; face2 is -1 where there is one only.
     """
     corners1, corners2 = soup.triangles(face1).T, soup.triangles(face2).T
-    n1, n2 = facing(source, _unit_normals(corners1), x), facing(source, _unit_normals(corners2), x)
+    n1, n2 = (facing(source, areas(*np.moveaxis(c, 1, 0))[1], x) for c in (corners1, corners2))
     two = face2 >= 0
     out1, out2 = _furthest(n2, corners1 - x[:, None]), _furthest(n1, corners2 - x[:, None])
     level1, level2 = edge_on(source, n1, x), edge_on(source, n2, x)
@@ -131,13 +132,6 @@ def normals_beside(
     lit = np.where(swap[:, None], n2, n1)
     dark = np.where(two[:, None], -np.where(swap[:, None], n1, n2), 0.0)
     return np.stack([lit, dark], axis=1), swap
-
-
-def _unit_normals(corners: Reals) -> Reals:
-    """(n, 3) of triangles (n, 3, 3); 0 where they have no area."""
-    a, b, c = np.moveaxis(corners, 1, 0)
-    area = np.cross(b - a, c - a)
-    return area / np.maximum(np.linalg.norm(area, axis=1, keepdims=True), 1e-300)
 
 
 def _furthest(normals: Reals, corners: Reals) -> Reals:

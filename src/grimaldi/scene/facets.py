@@ -38,13 +38,16 @@ class _Sides(NamedTuple):
 
 def facets(mesh: Mesh) -> Facets | None:
     """The mesh by its plane parts; None where that would not leave much fewer triangles."""
-    if len(mesh.faces) < FEW * WORTH or _is_curved(mesh):
+    if len(mesh.faces) < FEW * WORTH:
+        return None
+    area, normal = areas(*(mesh.vertices[mesh.faces[:, i]] for i in range(3)))
+    if _is_curved(normal):
         return None
     x = mesh.vertices + 0.0  # -0.0 becomes 0.0
     kept, number = merged_points(np.ascontiguousarray(x.T), np.zeros(len(x), np.int64))
     x, corners = x[kept], number[mesh.faces]
     off = FLAT * (np.abs(x).max() + np.ptp(x, axis=0).max())
-    sides, flat = _plane_parts(x, corners, off)
+    sides, flat = _plane_parts(x, corners, area, normal, off)
     while np.count_nonzero(flat[sides.facet[::3]]) > (1 - 1 / WORTH) * len(corners):
         borders = _borders(x, sides, flat, off)
         inside, broken = _triangulated(x, corners, sides, borders, flat)
@@ -54,15 +57,17 @@ def facets(mesh: Mesh) -> Facets | None:
     return None
 
 
-def _is_curved(mesh: Mesh) -> bool:
-    """Whether there are too many directions of faces for much of it to be flat: a quick look."""
-    _, normal = areas(*(mesh.vertices[mesh.faces[:, i]] for i in range(3)))
+def _is_curved(normal: Vector) -> bool:
+    """Whether there are too many directions of faces (m, 3) for much of them to be flat: a quick look."""
     step = np.round(NORMALS * (normal + 1)).astype(np.int64)
     return len(np.unique((step[:, 0] << 20) + (step[:, 1] << 10) + step[:, 2])) > len(normal) / WORTH
 
 
-def _plane_parts(x: Vector, corners: Integers, off: float) -> tuple[_Sides, Flags]:
-    """The sides of triangles (m, 3), and of each facet whether it is one plane part of at least `FEW` of them."""
+def _plane_parts(x: Vector, corners: Integers, area: Vector, unit: Vector, off: float) -> tuple[_Sides, Flags]:
+    """The sides of triangles (m, 3), and of each facet whether it is one plane part of at least `FEW` of them.
+
+    area, unit (m, 3) as in `areas`.
+    """
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
@@ -72,14 +77,13 @@ def _plane_parts(x: Vector, corners: Integers, off: float) -> tuple[_Sides, Flag
     one = np.flatnonzero(twin > np.arange(len(twin)))
     two = twin[one]
     f, g = one // 3, two // 3
-    _, unit = areas(*(x[corners[:, i]] for i in range(3)))
     apex = corners[g, (two + 2) % 3]
     level = np.abs(np.einsum("ij,ij->i", x[apex] - x[corners[f, 0]], unit[f])) <= off
     level &= np.einsum("ij,ij->i", unit[f], unit[g]) > 0
     joins = coo_array((np.ones(level.sum(), bool), (f[level], g[level])), shape=(m, m))
     parts, part = connected_components(joins, directed=False)
 
-    flat = _is_plane(x, corners, part, parts, off) & (np.bincount(part) >= FEW)
+    flat = _is_plane([x[corners[:, i]] for i in range(3)], area, unit, part, parts, off) & (np.bincount(part) >= FEW)
     alone = ~flat[part]
     part[alone] = parts + np.arange(np.count_nonzero(alone))  # no triangle of these is any other's business
     flat = np.append(flat, np.zeros(np.count_nonzero(alone), bool))
@@ -101,10 +105,11 @@ def _paired(tail: Integers, head: Integers, n: int) -> tuple[Integers, Integers]
     return group, twin
 
 
-def _is_plane(x: Vector, corners: Integers, part: Integers, parts: int, off: float) -> Flags:
-    """Whether parts of a surface are plane as wholes: one that curves little from face to face is not."""
-    own = [x[corners[:, i]] for i in range(3)]
-    area, unit = areas(*own)
+def _is_plane(own: list[Vector], area: Vector, unit: Vector, part: Integers, parts: int, off: float) -> Flags:
+    """Whether parts of a surface are plane as wholes: one that curves little from face to face is not.
+
+    own: the corners of its triangles (m, 3), three arrays.
+    """
     normal = np.stack([np.bincount(part, column) for column in area.T], axis=1)
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
     middle = np.stack([np.bincount(part, column) for column in np.sum(own, axis=0).T], axis=1)
