@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import drjit as dr
@@ -21,8 +21,10 @@ from grimaldi.diffraction.hierarchy import layout, least_detour
 from grimaldi.diffraction.model import Options, Receivers
 from grimaldi.diffraction.reach import reach
 from grimaldi.diffraction.segment import Corners, Rule, line, segment_wave
-from grimaldi.engine.cells import LARGEST, Nodes, cells
-from grimaldi.engine.tiles import Shot, bands, sight
+from grimaldi.engine.asking import ask
+from grimaldi.engine.blocks import Sight, Squares, squares
+from grimaldi.engine.cells import LARGEST, Nodes, Shares, cells
+from grimaldi.engine.tiles import Shot, sight
 from grimaldi.light import Settings, prepare
 
 mi: Any = mitsuba
@@ -145,23 +147,60 @@ def test_what_lies_far_from_the_rays_is_left_out_within_the_tolerance(crowd):
 # ---------------------------------------------------------------- blocks of receivers
 
 
+@dataclass
+class Floor:
+    """A floor under twelve bodies as a camera sees it, M there by all pieces and by lists of blocks."""
+
+    tolerance: float
+    occlusion: str
+
+    def __post_init__(self) -> None:
+        self.scene = grimaldi.load(scenes.bodies(12, seed=2, size=64, spp=1))
+        settings = Settings(wavelength=scenes.WAVELENGTH, tolerance=self.tolerance, occlusion=self.occlusion)
+        self.light = prepare(self.scene, settings)
+        self.film = squares(lambda x, y: self.sight(x, y), 64, 0, 64)
+
+    def sight(self, x: Any, y: Any) -> Sight:
+        return sight(self.light, self.scene.mitsuba.sensors()[0], Shot(64, 64, 1, 0, 2, 5, False), x, y)[0]
+
+    def both(self, film: Squares, x: Reals, y: Reals) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
+        """M by the blocks of `film`, and by all pieces, at places of it."""
+        x, y = (mi.Float(v.astype(np.float32)) for v in (x, y))
+        receivers = self.sight(x, y).receivers
+        factor = self.light.beams[0].factor
+        assert receivers.active.numpy().all()
+        return tuple(
+            m.real.numpy() + 1j * m.imag.numpy() for m in (ask(film, factor)(x, y, receivers), factor(receivers))
+        )
+
+
 @pytest.mark.parametrize("occlusion", ["none", "graded"])
 def test_lists_of_blocks_add_up_to_all_pieces(occlusion):
-    """At what a camera sees of a floor under twelve bodies; a few points may lie where a thin shadow goes unseen."""
+    """But for fringes finer than a pixel; a few points may lie where a thin shadow goes unseen."""
     tolerance = 2e-2
-    scene = grimaldi.load(scenes.bodies(12, seed=2, size=64, spp=1))
-    light = prepare(scene, Settings(wavelength=scenes.WAVELENGTH, tolerance=tolerance, occlusion=occlusion))
-    sensor, shot = scene.mitsuba.sensors()[0], Shot(64, 64, 1, 0, 2, 5, False)
-    (band,) = bands(light, sensor, shot)
-    rng = np.random.default_rng(1)
-    x, y = (mi.Float(v) for v in rng.uniform(0, 64, (2, 4000)).astype(np.float32))
-    (_, receivers, _), _ = sight(light, sensor, shot, x, y)
-    fast, whole = band.asks[0](x, y, receivers), light.beams[0].factor(receivers)
-    off = np.hypot((fast.real - whole.real).numpy(), (fast.imag - whole.imag).numpy())[receivers.active.numpy()]
-    assert abs(whole.real.numpy() - 1).max() > 0.5
+    floor = Floor(tolerance, occlusion)
+    blocks = floor.film.blocks
+    point = dr.zeros(mi.Vector3f, dr.width(blocks.p))
+    film = replace(floor.film, blocks=blocks._replace(right=point, down=point))  # pixels without extent
+    fast, whole = floor.both(film, *np.random.default_rng(1).uniform(0, 64, (2, 4000)))
+    off = abs(fast - whole)
+    assert abs(whole.real - 1).max() > 0.5
     assert np.quantile(off, 0.9) < 0.1 * tolerance
     assert np.sqrt((off**2).mean()) < 0.25 * tolerance
     assert 0 < off.max() < (tolerance if occlusion == "none" else 0.15)
+
+
+def test_fringes_that_lists_leave_out_are_too_fine_for_pixels():
+    """At points they matter, in means over pixels they do not."""
+    tolerance, n = 5e-2, 400
+    floor = Floor(tolerance, "none")
+    rng = np.random.default_rng(1)
+    pixels = rng.integers(0, 64, (2, 40, 1)) + rng.uniform(0, 1, (2, 40, n))
+    fast, whole = floor.both(floor.film, *pixels.reshape(2, -1))
+    off = (fast - whole).reshape(-1, n)
+    at_points, of_means = np.sqrt((abs(off) ** 2).mean()), np.sqrt((abs(off.mean(axis=1)) ** 2).mean())
+    assert at_points > 0.2 * tolerance
+    assert of_means < 0.25 * at_points
 
 
 # ---------------------------------------------------------------- cells of the film
@@ -174,9 +213,14 @@ def waves(x: Any, y: Any) -> Nodes:
     return Nodes(real, imag, mi.Float(0), 100 + 0 * x, shape, mi.Float(dr.inf))
 
 
+def only(missed: float) -> Shares:
+    """Nothing is left to rays; light beside makes errors count as much in the dark."""
+    return Shares(missed, 0.0, 1.0)
+
+
 def test_cells_keep_their_share_and_do_not_reach_over_edges():
     share = 5e-3
-    film = cells(waves, 96, 0, 64, 2, share)
+    film = cells(waves, 96, 0, 64, 2, only(share))
     rng = np.random.default_rng(0)
     x, y = mi.Float(rng.uniform(0, 96, 50_000)), mi.Float(rng.uniform(0, 64, 50_000))
     exact = waves(x, y)
@@ -200,15 +244,91 @@ def test_cells_far_too_coarse_for_the_fringes_are_not_halved():
         real = dr.select(x > 32, dr.cos(7 * x + 11 * y), 1)
         return Nodes(real, 0 * x, mi.Float(0), 100 + 0 * x, mi.UInt32(1) + mi.UInt32(0 * x), mi.Float(dr.inf))
 
-    film = cells(fine_to_the_right, 64, 0, 64, 2, 1e-5)
-    assert asked == [(2 * 64 // LARGEST + 1) ** 2]
+    film = cells(fine_to_the_right, 64, 0, 64, 2, only(1e-5))
+    assert asked == [
+        (2 * 64 // LARGEST + 1) ** 2,
+        4 * 64 // LARGEST**2 * 16 // 2,
+    ]  # nodes, and one more in cells that serve
     assert ((film.size.numpy().reshape(64, 64) > 0) == (np.arange(64) < 32)).all()
 
 
 def test_a_part_of_the_film_has_the_cells_of_the_whole():
-    whole, part = cells(waves, 96, 0, 64, 2, 5e-3), cells(waves, 96, LARGEST, 32, 2, 5e-3)
+    whole, part = cells(waves, 96, 0, 64, 2, only(5e-3)), cells(waves, 96, LARGEST, 32, 2, only(5e-3))
     across = len(whole.size) // 64
     np.testing.assert_array_equal(part.size.numpy(), whole.size.numpy()[LARGEST * across : 48 * across])
+
+
+def test_where_waves_are_faint_pictures_show_what_rays_find():
+    """Fringes too fine for any cell: of |M - 1| = 0.01 on the left, which is as good as 1, and 0.05 on the right."""
+
+    def faint(x: Any, y: Any) -> Nodes:
+        size = dr.select(x < 32, 0.01, 0.05)
+        return Nodes(
+            1 + size * dr.cos(9 * x + 7 * y),
+            size * dr.sin(9 * x + 7 * y),
+            0 * x,
+            100 + 0 * x,
+            mi.UInt32(1) + mi.UInt32(0 * x),
+            mi.Float(dr.inf),
+        )
+
+    film = cells(faint, 64, 0, 64, 1, Shares(1e-4, 0.02))
+    sizes = film.size.numpy().reshape(64, 64)
+    assert (sizes[:, :16] == LARGEST).all()
+    assert (sizes[:, 32:] == 0).all()
+    x, y = mi.Float(np.linspace(0, 15.9, 40)), mi.Float(np.linspace(0, 60, 40))
+    known = film.at(x, y, 100 + 0 * x, mi.UInt32(1), mi.Bool(True))
+    assert known.holds.numpy().all()
+    assert (known.real.numpy() == 1).all()
+    assert (known.imag.numpy() == 0).all()
+    assert (abs(known.error.numpy() - 0.01) < 1e-5).all()
+
+
+def test_errors_of_interpolation_count_by_the_light_that_they_change():
+    """A bend of M in the dark that would be too much in the light, or where other light adds to it."""
+
+    def dark(x: Any, y: Any) -> Nodes:
+        u = x / 16 - dr.floor(x / 16)
+        return Nodes(
+            0.01 * dr.sin(np.pi * u), 0 * x, 0 * x, 100 + 0 * x, mi.UInt32(1) + mi.UInt32(0 * x), mi.Float(dr.inf)
+        )
+
+    alone, beside = (cells(dark, 64, 0, 64, 1, Shares(2e-4, 0.0, light)).size.numpy() for light in (0.0, 1.0))
+    assert alone.min() == LARGEST > beside.max()
+
+
+def test_fringes_as_wide_as_nodes_are_apart_are_noticed():
+    """M is 1 at all nodes of a cell 4 pixels across, and of those around, and 0.8 between."""
+
+    def between_nodes(x: Any, y: Any) -> Nodes:
+        return Nodes(
+            0.9 + 0.1 * dr.cos(np.pi * y), 0 * x, 0 * x, 100 + 0 * x, mi.UInt32(1) + mi.UInt32(0 * x), mi.Float(dr.inf)
+        )
+
+    assert cells(between_nodes, 64, 0, 64, 2, only(1e-3)).size.numpy().max() == 0
+
+
+def test_pixels_where_shapes_meet_take_m_from_nodes_on_the_same():
+    """M is 1 on one side of an edge through pixels and 0.5 on the other; on a third shape there is none."""
+
+    def two(x: Any, y: Any) -> Nodes:
+        left = x + 0.3 * y < 32.2
+        shape = dr.select(left, mi.UInt32(1), mi.UInt32(2))
+        return Nodes(dr.select(left, 1.0, 0.5), 0 * x, 0 * x, dr.select(left, 100.0, 200.0), shape, mi.Float(dr.inf))
+
+    film = cells(two, 64, 0, 64, 1, only(1e-3))
+    assert film.unknown == 0
+    assert 60 < (film.size.numpy() == 0).sum() < 140
+    rng = np.random.default_rng(0)
+    x, y = mi.Float(rng.uniform(0, 64, 20_000)), mi.Float(rng.uniform(0, 64, 20_000))
+    exact = two(x, y)
+    there = ~film.at(x, y, exact.distance, exact.shape, mi.Bool(True)).holds
+    known = film.beside(x, y, exact.distance, exact.shape, there)
+    holds = known.holds.numpy()
+    assert holds.sum() > 200
+    assert there.numpy().sum() - holds.sum() < 0.2 * holds.sum()  # a corner without a node of its own
+    assert abs(known.real.numpy() - exact.real.numpy())[holds].max() < 1e-6
+    assert not film.beside(x, y, exact.distance, mi.UInt32(3), there).holds.numpy().any()
 
 
 @pytest.mark.parametrize("tolerance", [2e-2, 1e-3])

@@ -21,6 +21,7 @@ from grimaldi.diffraction.boundary import boundary
 from grimaldi.diffraction.frame import toward
 from grimaldi.diffraction.model import Evaluate, Factor, Options, Receivers
 from grimaldi.diffraction.none import none
+from grimaldi.engine.cells import Shares
 from grimaldi.engine.hits import Hits, hits
 from grimaldi.errors import InputError
 from grimaldi.options import checked_options
@@ -28,7 +29,8 @@ from grimaldi.propagate import Wave, carrier, factor
 from grimaldi.scene.bodies import indices, vertices
 from grimaldi.scene.model import Mesh, Scene, Source
 
-INTERPOLATED = 0.1, 5e-4, 0.03  # of a strict tolerance, at most; then of a loose one (`interpolated`)
+INTERPOLATED = 0.1, 5e-4, 0.04  # of a strict tolerance, at most; then of a loose one (`interpolated`)
+RAYS = 0.12  # of the tolerance: |M - M of a ray|, where pictures show a ray's
 
 
 @dataclass(frozen=True)
@@ -78,7 +80,7 @@ class Light:
     hits: Hits
     beams: tuple[Beam, ...]
     keys: tuple[tuple[float, str], ...]
-    interpolated: float  # of |M_computed - M|, that may be left to interpolation over the film
+    shares: tuple[Shares, ...]  # for each beam, what may be left of M over the film; none where M is always asked for
 
     asks: bool  # whether the model does more for M than to trace a ray
 
@@ -170,14 +172,17 @@ def prepare(scene: Scene, settings: Settings) -> Light:
         for wavelength in wavelengths
         for source in sources
     )
-    share = interpolated(options.tolerance) if options.fast and chosen is boundary else 0.0
-    return Light(scene, hits(scene), beams, keys, share, chosen is not none)
+    shares = tuple(_shares(beams, beam, options.tolerance) for beam in beams)
+    return Light(
+        scene, hits(scene), beams, keys, shares if options.fast and chosen is boundary else (), chosen is not none
+    )
 
 
-def interpolated(tolerance: float) -> float:
-    """|M| that pictures may leave to interpolation over the film: less of loose tolerances, which fringes are below."""
+def _shares(beams: Sequence[Beam], beam: Beam, tolerance: float) -> Shares:
+    """What may be left of a beam's M: less of loose tolerances to interpolation, which fringes are below."""
     strict, most, loose = INTERPOLATED
-    return max(min(strict * tolerance, most), loose * tolerance)
+    alone = sum(other.key == beam.key for other in beams) == 1
+    return Shares(max(min(strict * tolerance, most), loose * tolerance), RAYS * tolerance, 0.0 if alone else 1.0)
 
 
 class LightOf:

@@ -32,7 +32,7 @@ from grimaldi.diffraction.edges import (
 from grimaldi.diffraction.frame import Frame, frame
 from grimaldi.diffraction.grazing import Near, chords, near
 from grimaldi.diffraction.hierarchy import least_detour
-from grimaldi.diffraction.lists import Listed, Lists, Search, listed_sum, lists
+from grimaldi.diffraction.lists import WEAK_HERE, Listed, Lists, Search, listed_sum, lists
 from grimaldi.diffraction.model import OUTSIDE, Blocks, Evaluate, Factor, Grouped, Options, Receivers
 from grimaldi.diffraction.occlusion import Rays, rays
 from grimaldi.diffraction.screen import beyond
@@ -229,8 +229,10 @@ class _Bodies:
         receivers = receivers._replace(active=receivers.active & (receivers.block != OUTSIDE))
         fr = frame(self.problem.source, receivers.p, self.tab)
         beside = found.near(receivers, self.grazing)
-        tested = self._sum(fr, Listed(found, receivers.cell), 0.0, beside, receivers)
-        return self._factor(fr, receivers, listed_sum(fr, self.tab, found, self.k, self.rule, tested, receivers))
+        weak = self.tab.device(WEAK_HERE * self.problem.options.tolerance)
+        walk = Listed(found, receivers.cell, self.tab, self.k, weak)
+        tested = self._sum(fr, walk, 0.0, beside, receivers)
+        return self._factor(fr, receivers, listed_sum(fr, walk, self.rule, tested, receivers))
 
     def _sum(
         self, fr: Frame, walk: Walk, share: float, beside: Near | None, receivers: Receivers

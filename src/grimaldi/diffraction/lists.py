@@ -26,9 +26,12 @@ from grimaldi.scene.model import Source
 
 mi: Any = mitsuba  # the stubs refuse numbers where arrays are asked for
 
-CORNER = 0.02  # of the tolerance: |M| of a corner that is left out
+FINEST = 1.5  # cycles a pixel of fringes, from which on a picture's mean over pixels does without them,
+AVERAGED = 0.05  # at this tolerance and above; below, more in proportion
+CORNER = 0.007  # of the tolerance: |M| of a corner that is left out
 FINE = 1 << 16  # parts of its square, in which it is counted: sums of whole numbers are the same in any order
-WEAK = 0.1  # of the tolerance: |M| of an end that grows evenly between corners of cells which it reaches or not
+WEAK = 0.3  # of the tolerance: |M| of an end that grows evenly between corners of cells which it reaches or not
+WEAK_HERE = 0.2  # of the tolerance: likewise at one receiver, of whatever piece
 REMOTE = 1.5  # radii of a block, that such a piece is away from it at least
 ALL = (1 << ACROSS * ACROSS) - 1  # cells
 UNTESTED = 0.1  # of the tolerance: |M| of an end that reaches a block or not as a whole, by what its middle says
@@ -101,12 +104,20 @@ class Listed(NamedTuple):
 
     lists: Lists
     cell: Any  # of the receivers, in their blocks
+    table: Table
+    k: Any
+    weak: Any  # |M| of an end, below which no ray is asked for
 
     def bounds(self, receivers: Receivers) -> tuple[Any, Any]:
         return self.lists.tested.bounds(receivers.block, receivers.active)
 
+    def asks(self, fr: Frame, i: Any) -> Any:
+        """Whether the piece at a place takes a ray."""
+        piece = self.table.piece(self.lists.tested.item(i))
+        return self.lists.asks(i, self.cell) & (cut_off(fr, piece, self.k) >= self.weak)
+
     def visit(self, fr: Frame, i: Any) -> tuple[Any, Any, Any]:
-        ask = self.lists.asks(i, self.cell)
+        ask = self.asks(fr, i)
         return self.lists.tested.item(i), ask, ask
 
     def after(self, i: Any, inside: Any) -> Any:
@@ -162,13 +173,14 @@ def lists(search: Search, blocks: Blocks) -> Lists:
     seen = _look(search, blocks, pairs, beside)
 
     # where a piece reaches this block but not the next in the same plane, it may not reach all of it
-    reached = dr.zeros(mi.Bool, number * n)
-    dr.scatter(reached, seen.open, pairs.index)
+    open_, closed = dr.zeros(mi.Bool, number * n), dr.zeros(mi.Bool, number * n)
+    dr.scatter(open_, seen.open, pairs.index)
+    dr.scatter(closed, ~seen.open, pairs.index)
     curved = dr.gather(mi.Float, blocks.bend, pairs.block) > 0
     changes = mi.Bool(curved)
     for side in blocks.beside:
         other = dr.gather(mi.UInt32, side, pairs.block) * n + pairs.piece
-        changes |= dr.gather(mi.Bool, reached, other) != seen.open
+        changes |= dr.select(seen.open, dr.gather(mi.Bool, closed, other), dr.gather(mi.Bool, open_, other))
     limit = 2 * np.pi * tolerance
     faint = seen.far & (dr.maximum(dr.abs(seen.start), dr.abs(seen.stop)) < UNTESTED * limit)
     tested = curved | (changes & ~faint) | seen.passes
@@ -228,10 +240,28 @@ def _pairs(search: Search, blocks: Blocks, n: int) -> _Pairs:
     acts = dr.gather(mi.Bool, blocks.active, block)
     acts &= least_detour(fr, piece.middle, piece.reach + radius) <= tab.far
     acts &= dr.select(bend == 0, sounds(fr, piece, normal), dr.dot(normal, d) < radius + bend * dr.norm(d))
+    acts &= _finest(fr, search.k, blocks, block, piece) <= FINEST * max(AVERAGED / search.tolerance, 1.0)
     found = _places(acts)
     block = found // n
     dr.eval(found, block)
     return _Pairs(block, found - block * n, found)
+
+
+def _finest(fr: Frame, k: Any, blocks: Blocks, block: Any, piece: Piece) -> Any:
+    """Cycles a pixel of a piece's fringes with the direct light, along rows or columns, where a block has the widest.
+
+    ∇Δ at P is the direction X→P less that of S→P.
+    """
+    V, corners = type(piece.middle), LATTICE * LATTICE
+    right, down = (dr.gather(type(v), v, block) for v in (blocks.right, blocks.down))
+    least = type(piece.reach)(dr.inf)
+    P = fr.foot + fr.z2 * fr.a - piece.middle
+    middle = dr.gather(type(blocks.p), blocks.p, block)
+    for i in (0, LATTICE - 1, corners // 2, corners - LATTICE, corners - 1):
+        d = P + V(dr.gather(type(blocks.lattice), blocks.lattice, block * corners + i) - middle)
+        slope = d / dr.norm(d) - fr.a
+        least = dr.minimum(least, dr.maximum(dr.abs(dr.dot(V(right), slope)), dr.abs(dr.dot(V(down), slope))))
+    return least * k / (2 * np.pi)
 
 
 def _beside(search: Search, blocks: Blocks) -> Near | None:
@@ -391,9 +421,10 @@ def _with(total: tuple[Any, ...], chain: Chain, share: Any) -> tuple[Any, ...]:
 
 @dr.syntax
 def listed_sum(
-    fr: Frame, tab: Table, found: Lists, k: Any, rule: Rule, tested: tuple[Sum, Nearest, Margins], receivers: Receivers
+    fr: Frame, walk: Listed, rule: Rule, tested: tuple[Sum, Nearest, Margins], receivers: Receivers
 ) -> tuple[Sum, Nearest, Margins]:
-    """The sum over all that acts on the receivers' blocks; `tested`: what their pieces to be tested make of it."""
+    """The sum over all that acts on the receivers' blocks; `tested`: what the pieces of the walk make of it."""
+    found, tab, k = walk.lists, walk.table, walk.k
     F = tab.types.Float
     U = dr.uint32_array_t(F)
     sums, nearest, margins = tested
@@ -402,7 +433,7 @@ def listed_sum(
     i, end = found.tested.bounds(block, active)
     while active & (i < end):
         share = F(found.share(i, receivers))
-        known = active & (share > 0) & ~found.asks(i, receivers.cell)
+        known = active & (share > 0) & ~walk.asks(fr, i)
         if known:
             chain = chain_wave(fr, tab, *tab.range(found.tested.item(i)), k, rule, None, False, known)
             total = _with(total, chain, share)

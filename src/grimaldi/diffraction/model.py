@@ -71,6 +71,8 @@ class Blocks(NamedTuple):
     active: Any
     lattice: Any  # Float64 (3): receivers at the corners of ACROSS × ACROSS cells of each, row by row
     normals: Any  # as n, there
+    right: Any  # a pixel's way along the film's rows, and along its columns, on the plane; 0 where there is none
+    down: Any
     members: Any  # UInt32: a bit for each of those that lies on the same surface, or in its plane
     beside: tuple[Any, ...]  # UInt32: blocks around it in the same plane, itself where none is
 

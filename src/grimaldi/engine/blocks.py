@@ -186,6 +186,7 @@ def _beside(group: _Group, square: Integers, second: NDArray[np.uint32], across:
 def _blocks(group: _Group, beside: list[Integers]) -> Blocks:
     """On the device."""
     single = np.float32
+    right, down = _pixel(group)
     return Blocks(
         mi.Point3d(group.p.T),
         mi.Vector3f(group.n.T.astype(single)),
@@ -194,9 +195,18 @@ def _blocks(group: _Group, beside: list[Integers]) -> Blocks:
         mi.Bool(group.there),
         mi.Point3d(group.lattice.reshape(-1, 3).T),
         mi.Vector3f(group.normals.reshape(-1, 3).T.astype(single)),
+        mi.Vector3f(right.T.astype(single)),
+        mi.Vector3f(down.T.astype(single)),
         _bits(group.member | (group.bend == 0)[:, None]),
         tuple(mi.UInt32(b.astype(np.uint32)) for b in beside),
     )
+
+
+def _pixel(group: _Group) -> tuple[Reals, Reals]:
+    """A pixel's way along rows and columns (squares, 3), on planes."""
+    corner, right, down = (group.lattice[:, i] for i in (0, LATTICE - 1, LATTICE * (LATTICE - 1)))
+    flat = (group.bend == 0)[:, None]
+    return np.where(flat, (right - corner) / SIDE, 0), np.where(flat, (down - corner) / SIDE, 0)
 
 
 def _bits(flags: NDArray[np.bool_]) -> Any:

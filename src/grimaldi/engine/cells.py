@@ -3,8 +3,10 @@
 M = U/U0 is far smoother than U: what a pinhole camera sees of it takes a node every few pixels, fewer where it
 changes slowly. Cells are halved until what a cell's own nodes say differs by little from what the cell around them
 predicted (Runge's comparison: a quadratic through nodes twice as near errs by an eighth), and where an outline's
-shadow is as near as the next node; not where even the finest would differ by too much. Cells lie at fixed places of
-the film, so that any part of a picture has the same nodes as the whole.
+shadow is as near as the next node, unless its fringes are wider than that; not where even the finest would differ by
+too much. Where what waves make of M is below a share of a loose tolerance, at all nodes of the largest cells, nothing
+is halved: there M is a ray's. Cells lie at fixed places of the film, so that any part of a picture has the same nodes
+as the whole.
 """
 
 from __future__ import annotations
@@ -26,7 +28,12 @@ HALVED = 0.25  # what halving a cell leaves of a quadratic's error, at most
 AT_BEST = 1 / 16  # what it leaves of it at best: an eighth of a cubic's, less in quarters where M is straighter
 STRAIGHT = 0.5  # what a quadratic leaves of a bilinear function's error, at most
 SIMPSON = 1 / 6, 4 / 6, 1 / 6  # means of quadratics
-IN_PIXEL = 3  # times a mean's error, that M may be off by within a pixel
+OF_PIXEL = 2  # times its share, that the mean over a pixel may be off by, the least cell: neighbours' are not alike
+IN_PIXEL = 6  # times its share, that M may be off by within a pixel
+FAINT = 1.5  # times the largest |M - M of a ray| at nodes, that it may be at one more place
+WITNESS = 0.31, 0.64  # where in a cell M is asked for once more: fringes as wide as nodes are apart look like none
+WIDE = 0.1  # |M - M of a ray| at all nodes of a cell, above which fringes, and the rim among them, are wider than it
+ASIDE = 0.02  # of the distance from the camera, that a node may lie nearer or further to count as on the same side
 DEPTH = 1e-4  # of the distance from the camera, that a surface may lie off the cell's
 
 
@@ -48,6 +55,18 @@ Evaluate = Callable[[Any, Any], Nodes]
 """evaluate(x, y): nodes at places of the film [pixels], Float32 arrays."""
 
 
+class Shares(NamedTuple):
+    """What may be left of M.
+
+    missed: of |M_computed - M|, by interpolation, times |M| + `beside`, the light that it adds to, so that intensities
+    are as exact in the dark as in the light; rays: of |M - M of a ray|, where M may be that.
+    """
+
+    missed: float
+    rays: float
+    beside: float = 0.0
+
+
 class Known(NamedTuple):
     """M between nodes, its error, and where it holds."""
 
@@ -63,9 +82,12 @@ class Cells:
 
     grid: _Grid
     nodes: Any  # packets: M's real and imaginary part, distance, clearance
+    shapes: Any  # of nodes
     size: Any  # of a pixel's cell in pixels, 0 where M is not known
     shape: Any  # what the cell shows
     error: Any
+    ray: Any  # 1 + M where that is a ray's, 0 elsewhere
+    mixed: Any  # the error of M in pixels without a cell, whose nodes lie on several shapes; infinite in others
     unknown: int  # pixels without a cell
 
     def knows(self, x: Any, y: Any) -> Any:
@@ -89,7 +111,30 @@ class Cells:
         for v in values:
             low, high = dr.minimum(low, v.z), dr.maximum(high, v.z)
         holds &= dr.abs(distance - found.z) <= dr.maximum(DEPTH * distance, 0.25 * (high - low))
-        return Known(found.x, found.y, dr.gather(mi.Float, self.error, pixel, holds), holds)
+        ray = dr.gather(mi.UInt32, self.ray, pixel, holds)
+        real, imag = dr.select(ray > 0, mi.Float(ray) - 1, found.x), dr.select(ray > 0, 0, found.y)
+        return Known(real, imag, dr.gather(mi.Float, self.error, pixel, holds), holds)
+
+    def beside(self, x: Any, y: Any, distance: Any, shape: Any, active: Any) -> Known:
+        """The same in pixels where several shapes meet: by the nodes on this one, nearer ones counting more."""
+        y = y - self.grid.top
+        pixel = mi.UInt32(y) * self.grid.pixels + mi.UInt32(x)
+        error = dr.gather(mi.Float, self.mixed, pixel, active)
+        active = active & dr.isfinite(error)
+        size = 1 << self.grid.shift
+        i, j = mi.UInt32(x) & ~mi.UInt32(size - 1), mi.UInt32(y) & ~mi.UInt32(size - 1)
+        a, b = (x - mi.Float(i)) / size, (y - mi.Float(j)) / size
+        total, weight = mi.Array4f(0), mi.Float(0)
+        for n in range(3):
+            for m in range(3):
+                node = self.grid.node(i, j, size, m, n)
+                value = dr.gather(mi.Array4f, self.nodes, node, active)
+                own = dr.gather(mi.UInt32, self.shapes, node, active) == shape
+                own &= dr.abs(distance - value.z) <= ASIDE * distance
+                w = dr.select(own, dr.rcp(dr.square(a - 0.5 * m) + dr.square(b - 0.5 * n) + 0.01), 0)
+                total, weight = dr.fma(mi.Array4f(w), value, total), weight + w
+        total *= dr.rcp(dr.maximum(weight, 1e-30))
+        return Known(total.x, total.y, error, active & (weight > 0))
 
 
 class _Grid(NamedTuple):
@@ -138,12 +183,25 @@ class _Level(NamedTuple):
     size: int
     serves: Any
     error: Any
+    ray: Any
+    mixed: Any
 
 
-def cells(evaluate: Evaluate, width: int, top: int, rows: int, finest: int, share: float) -> Cells:
+class _Verdict(NamedTuple):
+    """Whether cells serve, with M's error in them and as what (`Cells.ray`); what else is in `Cells.mixed`; and whether
+    parts of cells that do not serve may."""
+
+    serves: Any
+    error: Any
+    ray: Any
+    mixed: Any
+    halved: Any
+
+
+def cells(evaluate: Evaluate, width: int, top: int, rows: int, finest: int, shares: Shares) -> Cells:
     """The cells of `rows` rows of a film `width` pixels wide, from row `top` on, which `LARGEST` divides.
 
-    Cells are `finest` pixels or more across, a power of two; share: of interpolation in |M_computed - M|.
+    Cells are `finest` pixels or more across, a power of two.
     """
     across, down = -(-width // LARGEST), -(-rows // LARGEST)
     columns = 2 * across * LARGEST // finest + 1
@@ -162,9 +220,11 @@ def cells(evaluate: Evaluate, width: int, top: int, rows: int, finest: int, shar
     size = LARGEST
     while True:
         _fill(nodes, grid, order, x, y, size, evaluate)
-        serves, error, halved = _judged(nodes, grid, x, y, size, finest, share)
-        levels.append(_level(size, x, y, across * LARGEST // size, down * LARGEST // size, serves, error))
-        left: Any = dr.compress(halved)
+        found = _judged(nodes, grid, x, y, size, finest, shares)
+        if size > 1:
+            found = _witnessed(found, nodes, grid, x, y, size, evaluate, shares)
+        levels.append(_level(size, x, y, across * LARGEST // size, down * LARGEST // size, found))
+        left: Any = dr.compress(found.halved)
         if size == finest or len(left) == 0:
             break
         size //= 2
@@ -194,49 +254,115 @@ def _fill(nodes: _Nodes, grid: _Grid, order: tuple[Any, Any], x: Any, y: Any, si
     dr.eval(nodes.values, nodes.error, nodes.shape, nodes.there)
 
 
-def _judged(nodes: _Nodes, grid: _Grid, x: Any, y: Any, size: int, finest: int, share: float) -> tuple[Any, Any, Any]:
-    """Whether cells serve, the error of M in them, and whether parts of those that do not may."""
+def _judged(nodes: _Nodes, grid: _Grid, x: Any, y: Any, size: int, finest: int, shares: Shares) -> _Verdict:
+    """What the nodes of cells at (x, y) tell of them."""
     own = _gathered(nodes, grid, x, y, size)
     index = [grid.node(x, y, size, m, n) for n in range(3) for m in range(3)]
-    shape = dr.gather(mi.UInt32, nodes.shape, index[0])
-    same, error = shape > 0, mi.Float(0)
-    for i in index:
-        same &= dr.gather(mi.UInt32, nodes.shape, i) == shape
+    shapes = [dr.gather(mi.UInt32, nodes.shape, i) for i in index]
+    shape, error, clear = shapes[0], mi.Float(0), mi.Float(dr.inf)
+    same = shape > 0
+    for i, s, c in zip(index, shapes, own, strict=True):
+        same &= s == shape
         error = dr.maximum(error, dr.gather(mi.Float, nodes.error, i))
+        clear = dr.minimum(clear, c.w)
+    least, most, modulus = _waves(own)
+    off, mean = _missed(nodes, grid, x, y, size, own, shape, same)
+    # fringes that are finer than nodes are no better told by twice as many
+    doubt = dr.select(most > 0, dr.clip(off / (HALVED**2 * most), 1, 1 / HALVED), 1)
+    off, mean = off * doubt, mean * doubt
+    light = dr.minimum(modulus, 1) + dr.opaque(mi.Float, shares.beside)
+    left, left_of_mean = off * (light + off), mean * (light + mean)
+
+    missed, rays = dr.opaque(mi.Float, shares.missed), dr.opaque(mi.Float, shares.rays)
+    ray, mixed = mi.UInt32(0), mi.Float(dr.inf)
+    apart = (clear > size) | (size == finest)
+    if size == 1:
+        serves = same & (left_of_mean <= OF_PIXEL * missed) & (left <= IN_PIXEL * missed)
+    else:
+        serves = same & (left <= missed) & (apart | (least > WIDE))
+    if size == LARGEST:
+        lit = dr.square(own[0].x - 1) + dr.square(own[0].y) <= dr.square(rays)
+        ray = dr.select(same & apart & (most <= rays), dr.select(lit, mi.UInt32(2), 1), 0)
+        serves |= ray > 0
+        off = dr.select(ray > 0, most, off)
+    within = (IN_PIXEL if finest == 1 else 1) * missed
+    if size == finest:
+        spread = _spread(own, shapes)
+        mixed = dr.select(~same & (spread * (light + spread) <= within), error + spread, dr.inf)
+    hopeless = same & (left * AT_BEST ** math.log2(size / finest) > within)  # not where M is NaN
+    halved = ~serves & ~hopeless
+    verdict = _Verdict(serves, error + off, ray, mixed, halved)
+    dr.eval(*verdict)
+    return verdict
+
+
+def _witnessed(
+    found: _Verdict, nodes: _Nodes, grid: _Grid, x: Any, y: Any, size: int, evaluate: Evaluate, shares: Shares
+) -> _Verdict:
+    """The verdict, but for cells in which M is something else off their nodes."""
+    some: Any = dr.compress(found.serves)
+    if len(some) == 0:
+        return found
+    x, y, ray = (dr.gather(mi.UInt32, values, some) for values in (x, y, found.ray))
+    u, v = WITNESS
+    there = evaluate(mi.Float(x) + size * u, grid.top + mi.Float(y) + size * v)
+    told = _sum(_gathered(nodes, grid, x, y, size), _quadratic(mi.Float(u)), _quadratic(mi.Float(v)))
+    real, imag = dr.select(ray > 0, mi.Float(ray) - 1, told.x), dr.select(ray > 0, 0, told.y)
+    off = dr.sqrt(dr.square(real - mi.Float(there.real)) + dr.square(imag - mi.Float(there.imag)))
+    light = dr.minimum(dr.sqrt(dr.square(real) + dr.square(imag)), 1) + dr.opaque(mi.Float, shares.beside)
+    missed, rays = dr.opaque(mi.Float, shares.missed), dr.opaque(mi.Float, shares.rays)
+    fails = dr.select(ray > 0, off > FAINT * rays, off * (light + off) > missed)
+    dr.scatter(found.serves, ~fails, some)
+    dr.scatter(found.halved, fails, some)
+    dr.eval(found.serves, found.halved)
+    return found
+
+
+def _waves(own: list[Any]) -> tuple[Any, Any, Any]:
+    """The least and the largest |M - M of a ray|, and the largest |M| at nodes."""
+    least, of_lit, of_dark = mi.Float(dr.inf), mi.Float(0), mi.Float(0)
+    for c in own:
+        from_one, from_zero = dr.square(c.x - 1) + dr.square(c.y), dr.square(c.x) + dr.square(c.y)
+        least = dr.minimum(least, dr.minimum(from_one, from_zero))
+        of_lit, of_dark = dr.maximum(of_lit, from_one), dr.maximum(of_dark, from_zero)
+    return dr.sqrt(least), dr.sqrt(dr.minimum(of_lit, of_dark)), dr.sqrt(of_dark)
+
+
+def _missed(
+    nodes: _Nodes, grid: _Grid, x: Any, y: Any, size: int, own: list[Any], shape: Any, same: Any
+) -> tuple[Any, Any]:
+    """What quadratics leave of M in cells at most, and of its mean, by what the cell around them predicted."""
     c00, c10, c20, c01, c11, c21, c02, c12, c22 = own
     bent = [c10 - 0.5 * (c00 + c20), c01 - 0.5 * (c00 + c02), c21 - 0.5 * (c20 + c22), c12 - 0.5 * (c02 + c22)]
     bent.append(c11 - 0.25 * (c00 + c20 + c02 + c22))
-    left, mean = (
-        STRAIGHT * _largest(bent),
-        STRAIGHT * _length((bent[0] + bent[1] + bent[2] + bent[3] + 4 * bent[4]) / 9),
+    off = STRAIGHT * _largest(bent)
+    mean = STRAIGHT * _length((bent[0] + bent[1] + bent[2] + bent[3] + 4 * bent[4]) / 9)
+    if size == LARGEST:
+        return off, mean
+    around = x & ~mi.UInt32(2 * size - 1), y & ~mi.UInt32(2 * size - 1)
+    coarse = _gathered(nodes, grid, *around, 2 * size)
+    predicted = same
+    for i in (grid.node(*around, 2 * size, m, n) for n in range(3) for m in range(3)):
+        predicted &= dr.gather(mi.UInt32, nodes.shape, i) == shape
+    a, b = (mi.Float(c - c0) / (2 * size) for c, c0 in zip((x, y), around, strict=True))
+    columns = [_quadratic(a + 0.25 * m) for m in range(3)]
+    rows = [_quadratic(b + 0.25 * n) for n in range(3)]
+    misses = [own[3 * n + m] - _sum(coarse, columns[m], rows[n]) for n in range(3) for m in range(3)]
+    return (
+        dr.select(predicted, HALVED * _largest(misses), off),
+        dr.select(predicted, HALVED * _length(_sum(misses, SIMPSON, SIMPSON)), mean),
     )
-    if size < LARGEST:
-        around = x & ~mi.UInt32(2 * size - 1), y & ~mi.UInt32(2 * size - 1)
-        coarse = _gathered(nodes, grid, *around, 2 * size)
-        predicted = same
-        for i in (grid.node(*around, 2 * size, m, n) for n in range(3) for m in range(3)):
-            predicted &= dr.gather(mi.UInt32, nodes.shape, i) == shape
-        a, b = (mi.Float(c - c0) / (2 * size) for c, c0 in zip((x, y), around, strict=True))
-        columns = [_quadratic(a + 0.25 * m) for m in range(3)]
-        rows = [_quadratic(b + 0.25 * n) for n in range(3)]
-        misses = [own[3 * n + m] - _sum(coarse, columns[m], rows[n]) for n in range(3) for m in range(3)]
-        left = dr.select(predicted, HALVED * _largest(misses), left)
-        mean = dr.select(predicted, HALVED * _length(_sum(misses, SIMPSON, SIMPSON)), mean)
-    most = dr.opaque(mi.Float, share)
-    if size > finest:
-        clear = mi.Float(dr.inf)
-        for c in own:
-            clear = dr.minimum(clear, c.w)
-        serves = same & (left <= most) & (clear > size)
-    elif size > 1:
-        serves = same & (left <= most)
-    else:
-        serves = same & (mean <= most) & (left <= IN_PIXEL * most)
-    within = (IN_PIXEL if finest == 1 else 1) * most
-    halved = ~serves & ~(left * AT_BEST ** math.log2(size / finest) > within)  # also where M is NaN
-    error += left
-    dr.eval(serves, error, halved)
-    return serves, error, halved
+
+
+def _spread(own: list[Any], shapes: list[Any]) -> Any:
+    """The largest difference of M between nodes on one lit shape."""
+    most = mi.Float(0)
+    for i, a in enumerate(own):
+        for j in range(i):
+            d = a - own[j]
+            same = (shapes[i] == shapes[j]) & (shapes[i] > 0)
+            most = dr.maximum(most, dr.select(same, dr.fma(d.x, d.x, d.y * d.y), 0))
+    return dr.sqrt(most)
 
 
 def _gathered(nodes: _Nodes, grid: _Grid, x: Any, y: Any, size: int) -> list[Any]:
@@ -271,12 +397,19 @@ def _sum(values: list[Any], columns: tuple[Any, Any, Any], rows: tuple[Any, Any,
     return total
 
 
-def _level(size: int, x: Any, y: Any, across: int, down: int, serves: Any, error: Any) -> _Level:
+def _level(size: int, x: Any, y: Any, across: int, down: int, found: _Verdict) -> _Level:
     """The cells at pixels (x, y) among all of their size."""
     place = (y // size) * dr.opaque(mi.UInt32, across) + x // size
-    level = _Level(size, dr.zeros(mi.Bool, across * down), dr.zeros(mi.Float, across * down))
-    dr.scatter(level.serves, serves, place)
-    dr.scatter(level.error, error, place)
+    count = across * down
+    level = _Level(
+        size,
+        dr.zeros(mi.Bool, count),
+        dr.zeros(mi.Float, count),
+        dr.zeros(mi.UInt32, count),
+        dr.full(mi.Float, dr.inf, count),
+    )
+    for values, of_cells in zip(level[1:], found, strict=False):
+        dr.scatter(values, of_cells, place)
     return level
 
 
@@ -292,14 +425,16 @@ def _by_pixel(nodes: _Nodes, grid: _Grid, levels: list[_Level], pixels: int, row
     index = dr.arange(mi.UInt32, pixels * rows)
     y = index // grid.pixels
     x = index - y * grid.pixels
-    size, error = mi.UInt32(0), mi.Float(0)
+    size, error, ray, mixed = mi.UInt32(0), mi.Float(0), mi.UInt32(0), mi.Float(dr.inf)
     for level in levels:
         place = (y // level.size) * (grid.pixels // level.size) + x // level.size
         serves = dr.gather(mi.Bool, level.serves, place)
         size = dr.select(serves, level.size, size)
         error = dr.select(serves, dr.gather(mi.Float, level.error, place), error)
+        ray = dr.select(serves, dr.gather(mi.UInt32, level.ray, place), ray)
+        mixed = dr.minimum(mixed, dr.gather(mi.Float, level.mixed, place))
     first = grid.node(x & ~(size - 1), y & ~(size - 1), size, 0, 0)
     shape = dr.gather(mi.UInt32, nodes.shape, first, size > 0)
-    unknown: Any = dr.count(size == 0)
-    dr.eval(size, error, shape, unknown)
-    return Cells(grid, nodes.values, size, shape, error, int(unknown[0]))
+    unknown: Any = dr.count((size == 0) & ~dr.isfinite(mixed))
+    dr.eval(size, error, ray, mixed, shape, unknown)
+    return Cells(grid, nodes.values, nodes.shape, size, shape, error, ray, mixed, int(unknown[0]))

@@ -85,7 +85,7 @@ class Band:
 
 def bands(light: Light, sensor: Any, shot: Shot) -> Iterator[Band]:
     """The film from its top on, as many rows at once as memory allows."""
-    if light.interpolated == 0 or sensor.needs_aperture_sample():
+    if not light.shares or sensor.needs_aperture_sample():
         yield Band(0, shot.height, (), ())
         return
     finest = 1 if shot.spp >= 8 else 2 if shot.spp >= 2 else 4  # a finer cell asks no less than its pixels would
@@ -96,8 +96,10 @@ def bands(light: Light, sensor: Any, shot: Shot) -> Iterator[Band]:
         rows = min(step, shot.height - top)
         film = squares(lambda x, y: sight(light, sensor, shot, x, y)[0], shot.width, top, rows)
         asks = tuple(ask(film, beam.factor) for beam in light.beams)
-        nodes = (partial(_nodes, light, a, sensor, shot) for a in asks)
-        found = tuple(cells(at, shot.width, top, rows, finest, light.interpolated) for at in nodes)
+        found = tuple(
+            cells(partial(_nodes, light, a, sensor, shot), shot.width, top, rows, finest, shares)
+            for a, shares in zip(asks, light.shares, strict=True)
+        )
         yield Band(top, rows, found, asks)
 
 
@@ -161,7 +163,7 @@ class Samples(NamedTuple):
 
 
 def _at_samples(light: Light, ask: Ask, sensor: Any, shot: Shot, first: int, pixels: int, cells: Cells) -> Samples:
-    """M at the samples of the pixels that no cell serves, asked together."""
+    """M at the samples of the pixels that no cell serves: by nodes on the same shape, or asked together."""
     rank = dr.full(mi.UInt32, OUTSIDE, pixels)
     every = dr.opaque(mi.UInt32, first) + dr.arange(mi.UInt32, pixels)
     width = dr.opaque(mi.UInt32, shot.width)
@@ -174,9 +176,17 @@ def _at_samples(light: Light, ask: Ask, sensor: Any, shot: Shot, first: int, pix
     of = index // dr.opaque(mi.UInt32, shot.spp)
     pixel = dr.opaque(mi.UInt32, first) + dr.gather(mi.UInt32, own, of)
     _, film = _sample(shot, pixel, index - of * dr.opaque(mi.UInt32, shot.spp))
-    (_, receivers, _), _ = sight(light, sensor, shot, film.x, film.y)
-    m = ask(film.x, film.y, receivers)
-    return Samples(rank, receivers.active, m.real, m.imag, m.error)
+    (_, receivers, shape), si = sight(light, sensor, shot, film.x, film.y)
+    found = cells.beside(film.x, film.y, si.t, shape, receivers.active)
+    values = [mi.Float64(v) for v in found[:3]]
+    dr.eval(values, found.holds, film, receivers)
+    left: Any = dr.compress(receivers.active & ~found.holds)
+    if len(left):
+        p, n, at = (dr.gather(type(v), v, left) for v in (receivers.p, receivers.n, film))
+        m = ask(at.x, at.y, Receivers(p, n, mi.Bool(True)))
+        for value, asked in zip(values, (m.real, m.imag, m.error), strict=True):
+            dr.scatter(value, asked, left)
+    return Samples(rank, receivers.active, *values)
 
 
 def render_tile(light: Light, sensor: Any, shot: Shot, first: int, pixels: int, band: Band | None = None) -> Tile:
