@@ -29,7 +29,7 @@ from grimaldi.propagate import Wave, carrier, factor
 from grimaldi.scene.bodies import indices, vertices
 from grimaldi.scene.model import Mesh, Scene, Source
 
-INTERPOLATED = 0.1, 5e-4, 0.04  # of a strict tolerance, at most; then of a loose one (`interpolated`)
+INTERPOLATED = 0.1, 5e-4, 0.035  # of a strict tolerance, at most; then of a loose one (`interpolated`)
 RAYS = 0.12  # of the tolerance: |M - M of a ray|, where pictures show a ray's
 
 

@@ -2,7 +2,8 @@
 
 A piece near the ray, or one that reaches part of the block, is asked for at every receiver. Of pieces that reach all of
 it, neighbours in a chain make one run; far from the ray, where ψ = kΔ runs fast, a run is no more than the leading
-terms of its two ends, C φ' e^{iψ}/(iψ'), and what its corners inside send is left out and counted.
+terms of its two ends, C φ' e^{iψ}/(iψ'), and what its corners inside send is left out and counted. A piece whose
+fringes are finer than pixels everywhere in the block is on no list: it takes no part in means over pixels.
 """
 
 from __future__ import annotations
