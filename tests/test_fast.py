@@ -215,7 +215,7 @@ def waves(x: Any, y: Any) -> Nodes:
 
 def only(missed: float) -> Shares:
     """Nothing is left to rays; light beside makes errors count as much in the dark."""
-    return Shares(missed, 0.0, 1.0)
+    return Shares(missed, np.inf, 0.0, 1.0)
 
 
 def test_cells_keep_their_share_and_do_not_reach_over_edges():
@@ -272,7 +272,7 @@ def test_where_waves_are_faint_pictures_show_what_rays_find():
             mi.Float(dr.inf),
         )
 
-    film = cells(faint, 64, 0, 64, 1, Shares(1e-4, 0.02))
+    film = cells(faint, 64, 0, 64, 1, Shares(1e-4, np.inf, 0.02))
     sizes = film.size.numpy().reshape(64, 64)
     assert (sizes[:, :16] == LARGEST).all()
     assert (sizes[:, 32:] == 0).all()
@@ -293,8 +293,11 @@ def test_errors_of_interpolation_count_by_the_light_that_they_change():
             0.01 * dr.sin(np.pi * u), 0 * x, 0 * x, 100 + 0 * x, mi.UInt32(1) + mi.UInt32(0 * x), mi.Float(dr.inf)
         )
 
-    alone, beside = (cells(dark, 64, 0, 64, 1, Shares(1e-3, 0.0, light)).size.numpy() for light in (0.0, 1.0))
-    assert alone.min() == LARGEST > beside.max()
+    def sizes(most: float, beside: float) -> NDArray[np.uint32]:
+        return cells(dark, 64, 0, 64, 1, Shares(1e-3, most, 0.0, beside)).size.numpy()
+
+    assert sizes(np.inf, 0.0).min() == LARGEST > sizes(np.inf, 1.0).max()
+    assert sizes(1e-3, 0.0).max() < LARGEST  # whatever the light
 
 
 def test_fringes_as_wide_as_nodes_are_apart_are_noticed():

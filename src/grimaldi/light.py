@@ -29,7 +29,8 @@ from grimaldi.propagate import Wave, carrier, factor
 from grimaldi.scene.bodies import indices, vertices
 from grimaldi.scene.model import Mesh, Scene, Source
 
-INTERPOLATED = 0.1, 5e-4, 0.035  # of a strict tolerance, at most; then of a loose one (`interpolated`)
+INTERPOLATED = 0.1, 5e-4, 0.035  # of a strict tolerance, at most; then of a loose one (`_shares`)
+MOST = 0.5  # of the tolerance, to interpolation
 RAYS = 0.12  # of the tolerance: |M - M of a ray|, where pictures show a ray's
 
 
@@ -182,7 +183,8 @@ def _shares(beams: Sequence[Beam], beam: Beam, tolerance: float) -> Shares:
     """What may be left of a beam's M: less of loose tolerances to interpolation, which fringes are below."""
     strict, most, loose = INTERPOLATED
     alone = sum(other.key == beam.key for other in beams) == 1
-    return Shares(max(min(strict * tolerance, most), loose * tolerance), RAYS * tolerance, 0.0 if alone else 1.0)
+    missed = max(min(strict * tolerance, most), loose * tolerance)
+    return Shares(missed, MOST * tolerance, RAYS * tolerance, 0.0 if alone else 1.0)
 
 
 class LightOf:

@@ -59,10 +59,12 @@ class Shares(NamedTuple):
     """What may be left of M.
 
     missed: of |M_computed - M|, by interpolation, times |M| + `beside`, the light that it adds to, so that intensities
-    are as exact in the dark as in the light; rays: of |M - M of a ray|, where M may be that.
+    are as exact in the dark as in the light; most: of |M_computed - M| itself; rays: of |M - M of a ray|, where M may
+    be that.
     """
 
     missed: float
+    most: float
     rays: float
     beside: float = 0.0
 
@@ -274,12 +276,14 @@ def _judged(nodes: _Nodes, grid: _Grid, x: Any, y: Any, size: int, finest: int, 
     left, left_of_mean = off * (light + off), mean * (light + mean)
 
     missed, rays = dr.opaque(mi.Float, shares.missed), dr.opaque(mi.Float, shares.rays)
+    allowed = dr.opaque(mi.Float, shares.most)
     ray, mixed = mi.UInt32(0), mi.Float(dr.inf)
     apart = (clear > size) | (size == finest)
+    serves = same & (off <= allowed)
     if size == 1:
-        serves = same & (left_of_mean <= OF_PIXEL * missed) & (left <= IN_PIXEL * missed)
+        serves &= (left_of_mean <= OF_PIXEL * missed) & (left <= IN_PIXEL * missed)
     else:
-        serves = same & (left <= missed) & (apart | (least > WIDE))
+        serves &= (left <= missed) & (apart | (least > WIDE))
     if size == LARGEST:
         lit = dr.square(own[0].x - 1) + dr.square(own[0].y) <= dr.square(rays)
         ray = dr.select(same & apart & (most <= rays), dr.select(lit, mi.UInt32(2), 1), 0)
@@ -288,7 +292,8 @@ def _judged(nodes: _Nodes, grid: _Grid, x: Any, y: Any, size: int, finest: int, 
     within = (IN_PIXEL if finest == 1 else 1) * missed
     if size == finest:
         spread = _spread(own, shapes)
-        mixed = dr.select(~same & (spread * (light + spread) <= within), error + spread, dr.inf)
+        alike = (spread <= allowed) & (spread * (light + spread) <= within)
+        mixed = dr.select(~same & alike, error + spread, dr.inf)
     hopeless = same & (left * AT_BEST ** math.log2(size / finest) > within)  # not where M is NaN
     halved = ~serves & ~hopeless
     verdict = _Verdict(serves, error + off, ray, mixed, halved)
@@ -311,7 +316,9 @@ def _witnessed(
     off = dr.sqrt(dr.square(real - mi.Float(there.real)) + dr.square(imag - mi.Float(there.imag)))
     light = dr.minimum(dr.sqrt(dr.square(real) + dr.square(imag)), 1) + dr.opaque(mi.Float, shares.beside)
     missed, rays = dr.opaque(mi.Float, shares.missed), dr.opaque(mi.Float, shares.rays)
-    fails = dr.select(ray > 0, off > FAINT * rays, off * (light + off) > missed)
+    fails = dr.select(
+        ray > 0, off > FAINT * rays, (off > dr.opaque(mi.Float, shares.most)) | (off * (light + off) > missed)
+    )
     dr.scatter(found.serves, ~fails, some)
     dr.scatter(found.halved, fails, some)
     dr.eval(found.serves, found.halved)
