@@ -158,7 +158,7 @@ class Floor:
         self.scene = grimaldi.load(scenes.bodies(12, seed=2, size=64, spp=1))
         settings = Settings(wavelength=scenes.WAVELENGTH, tolerance=self.tolerance, occlusion=self.occlusion)
         self.light = prepare(self.scene, settings)
-        self.film = squares(lambda x, y: self.sight(x, y), 64, 0, 64)
+        self.film = squares(self.sight, 64, 0, 64)
 
     def sight(self, x: Any, y: Any) -> Sight:
         return sight(self.light, self.scene.mitsuba.sensors()[0], Shot(64, 64, 1, 0, 2, 5, False), x, y)[0]
@@ -213,6 +213,12 @@ def waves(x: Any, y: Any) -> Nodes:
     return Nodes(real, imag, mi.Float(0), 100 + 0 * x, shape, mi.Float(dr.inf))
 
 
+def on_one(real: Any, imag: Any = 0) -> Nodes:
+    """Nodes that lie on one surface, far from all outlines."""
+    zero = 0 * real
+    return Nodes(real, zero + imag, zero, 100 + zero, mi.UInt32(1) + mi.UInt32(zero), mi.Float(dr.inf))
+
+
 def only(missed: float) -> Shares:
     """Nothing is left to rays; light beside makes errors count as much in the dark."""
     return Shares(missed, np.inf, 0.0, 1.0)
@@ -242,13 +248,10 @@ def test_cells_far_too_coarse_for_the_fringes_are_not_halved():
     def fine_to_the_right(x: Any, y: Any) -> Nodes:
         asked.append(dr.width(x))
         real = dr.select(x > 32, dr.cos(7 * x + 11 * y), 1)
-        return Nodes(real, 0 * x, mi.Float(0), 100 + 0 * x, mi.UInt32(1) + mi.UInt32(0 * x), mi.Float(dr.inf))
+        return on_one(real)
 
     film = cells(fine_to_the_right, 64, 0, 64, 2, only(1e-5))
-    assert asked == [
-        (2 * 64 // LARGEST + 1) ** 2,
-        4 * 64 // LARGEST**2 * 16 // 2,
-    ]  # nodes, and one more in cells that serve
+    assert asked == [(2 * 64 // LARGEST + 1) ** 2, (64 // LARGEST) ** 2 // 2]  # nodes; once more in cells that serve
     assert ((film.size.numpy().reshape(64, 64) > 0) == (np.arange(64) < 32)).all()
 
 
@@ -263,14 +266,7 @@ def test_where_waves_are_faint_pictures_show_what_rays_find():
 
     def faint(x: Any, y: Any) -> Nodes:
         size = dr.select(x < 32, 0.01, 0.05)
-        return Nodes(
-            1 + size * dr.cos(9 * x + 7 * y),
-            size * dr.sin(9 * x + 7 * y),
-            0 * x,
-            100 + 0 * x,
-            mi.UInt32(1) + mi.UInt32(0 * x),
-            mi.Float(dr.inf),
-        )
+        return on_one(1 + size * dr.cos(9 * x + 7 * y), size * dr.sin(9 * x + 7 * y))
 
     film = cells(faint, 64, 0, 64, 1, Shares(1e-4, np.inf, 0.02))
     sizes = film.size.numpy().reshape(64, 64)
@@ -289,9 +285,7 @@ def test_errors_of_interpolation_count_by_the_light_that_they_change():
 
     def dark(x: Any, y: Any) -> Nodes:
         u = x / 16 - dr.floor(x / 16)
-        return Nodes(
-            0.01 * dr.sin(np.pi * u), 0 * x, 0 * x, 100 + 0 * x, mi.UInt32(1) + mi.UInt32(0 * x), mi.Float(dr.inf)
-        )
+        return on_one(0.01 * dr.sin(np.pi * u))
 
     def sizes(most: float, beside: float) -> NDArray[np.uint32]:
         return cells(dark, 64, 0, 64, 1, Shares(1e-3, most, 0.0, beside)).size.numpy()
@@ -304,9 +298,7 @@ def test_fringes_as_wide_as_nodes_are_apart_are_noticed():
     """M is 1 at all nodes of a cell 4 pixels across, and of those around, and 0.8 between."""
 
     def between_nodes(x: Any, y: Any) -> Nodes:
-        return Nodes(
-            0.9 + 0.1 * dr.cos(np.pi * y), 0 * x, 0 * x, 100 + 0 * x, mi.UInt32(1) + mi.UInt32(0 * x), mi.Float(dr.inf)
-        )
+        return on_one(0.9 + 0.1 * dr.cos(np.pi * y))
 
     assert cells(between_nodes, 64, 0, 64, 2, only(1e-3)).size.numpy().max() == 0
 

@@ -173,10 +173,9 @@ def prepare(scene: Scene, settings: Settings) -> Light:
         for wavelength in wavelengths
         for source in sources
     )
-    shares = tuple(_shares(beams, beam, options.tolerance) for beam in beams)
-    return Light(
-        scene, hits(scene), beams, keys, shares if options.fast and chosen is boundary else (), chosen is not none
-    )
+    interpolates = options.fast and chosen is boundary
+    shares = tuple(_shares(beams, beam, options.tolerance) for beam in beams) if interpolates else ()
+    return Light(scene, hits(scene), beams, keys, shares, chosen is not none)
 
 
 def _shares(beams: Sequence[Beam], beam: Beam, tolerance: float) -> Shares:

@@ -32,7 +32,8 @@ from grimaldi.diffraction.edges import (
 from grimaldi.diffraction.frame import Frame, frame
 from grimaldi.diffraction.grazing import Near, chords, near
 from grimaldi.diffraction.hierarchy import least_detour
-from grimaldi.diffraction.lists import WEAK_HERE, Listed, Lists, Search, listed_sum, lists
+from grimaldi.diffraction.listing import Search, lists
+from grimaldi.diffraction.lists import WEAK_HERE, Listed, Lists, listed_sum
 from grimaldi.diffraction.model import OUTSIDE, Blocks, Evaluate, Factor, Grouped, Options, Receivers
 from grimaldi.diffraction.occlusion import Rays, rays
 from grimaldi.diffraction.screen import beyond

@@ -55,6 +55,11 @@ class Receivers(NamedTuple):
     u: Any = None  # where in it, 0..1 along the film's rows and columns
     v: Any = None
 
+    def some(self, index: Any) -> Receivers:
+        """Those at places of the arrays, active and in no block."""
+        p, n = (dr.gather(type(v), v, index) for v in (self.p, self.n))
+        return Receivers(p, n, dr.full(type(self.active), True, dr.width(index)))
+
 
 OUTSIDE = 0xFFFFFFFF
 ACROSS = 4  # cells across a block

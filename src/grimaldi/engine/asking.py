@@ -34,8 +34,7 @@ def _by_blocks(film: Squares, listed: Evaluate, whole: Evaluate, x: Any, y: Any,
     left: Any = dr.compress(outside)
     if len(left) == 0:
         return m
-    p, n = (dr.gather(type(v), v, left) for v in (receivers.p, receivers.n))
-    own = _evaluated(whole, Receivers(p, n, mi.Bool(True)))
+    own = _evaluated(whole, receivers.some(left))
     for values, of_own in zip(m, own, strict=True):
         dr.scatter(values, of_own, left)
     return m

@@ -4,9 +4,9 @@ M = U/U0 is far smoother than U: what a pinhole camera sees of it takes a node e
 changes slowly. Cells are halved until what a cell's own nodes say differs by little from what the cell around them
 predicted (Runge's comparison: a quadratic through nodes twice as near errs by an eighth), and where an outline's
 shadow is as near as the next node, unless its fringes are wider than that; not where even the finest would differ by
-too much. Where what waves make of M is below a share of a loose tolerance, at all nodes of the largest cells, nothing
-is halved: there M is a ray's. Cells lie at fixed places of the film, so that any part of a picture has the same nodes
-as the whole.
+too much. Where M differs from a ray's by less than a share of the tolerance, at all nodes of one of the largest cells,
+that is not halved: there M is a ray's. Cells lie at fixed places of the film, so that any part of a picture has the
+same nodes as the whole.
 """
 
 from __future__ import annotations
@@ -28,9 +28,11 @@ HALVED = 0.25  # what halving a cell leaves of a quadratic's error, at most
 AT_BEST = 1 / 16  # what it leaves of it at best: an eighth of a cubic's, less in quarters where M is straighter
 STRAIGHT = 0.5  # what a quadratic leaves of a bilinear function's error, at most
 SIMPSON = 1 / 6, 4 / 6, 1 / 6  # means of quadratics
-OF_PIXEL = 2  # times its share, that the mean over a pixel may be off by, the least cell: neighbours' are not alike
+OF_PIXEL = (
+    2  # times its share, that the mean over a pixel may be off by, where that is a cell: its neighbours err otherwise
+)
 IN_PIXEL = 6  # times its share, that M may be off by within a pixel
-FAINT = 1.5  # times the largest |M - M of a ray| at nodes, that it may be at one more place
+FAINT = 1.5  # times what |M - M of a ray| may be at nodes, that it may be at one more place
 WITNESS = 0.31, 0.64  # where in a cell M is asked for once more: fringes as wide as nodes are apart look like none
 WIDE = 0.1  # |M - M of a ray| at all nodes of a cell, above which fringes, and the rim among them, are wider than it
 ASIDE = 0.02  # of the distance from the camera, that a node may lie nearer or further to count as on the same side
@@ -90,7 +92,7 @@ class Cells:
     error: Any
     ray: Any  # 1 + M where that is a ray's, 0 elsewhere
     mixed: Any  # the error of M in pixels without a cell, whose nodes lie on several shapes; infinite in others
-    unknown: int  # pixels without a cell
+    unknown: int  # pixels that have none of both
 
     def knows(self, x: Any, y: Any) -> Any:
         """Whether pixels (x, y) of the film have a cell."""
@@ -100,7 +102,7 @@ class Cells:
     def at(self, x: Any, y: Any, distance: Any, shape: Any, active: Any) -> Known:
         """M where a ray through (x, y) of the film [pixels] met a surface at a distance."""
         y = y - self.grid.top
-        pixel = mi.UInt32(y) * self.grid.pixels + mi.UInt32(x)
+        pixel = self.grid.pixel(x, y)
         size = dr.gather(mi.UInt32, self.size, pixel, active)
         holds = active & (size > 0)
         holds &= dr.gather(mi.UInt32, self.shape, pixel, holds) == shape
@@ -113,14 +115,13 @@ class Cells:
         for v in values:
             low, high = dr.minimum(low, v.z), dr.maximum(high, v.z)
         holds &= dr.abs(distance - found.z) <= dr.maximum(DEPTH * distance, 0.25 * (high - low))
-        ray = dr.gather(mi.UInt32, self.ray, pixel, holds)
-        real, imag = dr.select(ray > 0, mi.Float(ray) - 1, found.x), dr.select(ray > 0, 0, found.y)
+        real, imag = _or_ray(found, dr.gather(mi.UInt32, self.ray, pixel, holds))
         return Known(real, imag, dr.gather(mi.Float, self.error, pixel, holds), holds)
 
     def beside(self, x: Any, y: Any, distance: Any, shape: Any, active: Any) -> Known:
         """The same in pixels where several shapes meet: by the nodes on this one, nearer ones counting more."""
         y = y - self.grid.top
-        pixel = mi.UInt32(y) * self.grid.pixels + mi.UInt32(x)
+        pixel = self.grid.pixel(x, y)
         error = dr.gather(mi.Float, self.mixed, pixel, active)
         active = active & dr.isfinite(error)
         size = 1 << self.grid.shift
@@ -133,7 +134,8 @@ class Cells:
                 value = dr.gather(mi.Array4f, self.nodes, node, active)
                 own = dr.gather(mi.UInt32, self.shapes, node, active) == shape
                 own &= dr.abs(distance - value.z) <= ASIDE * distance
-                w = dr.select(own, dr.rcp(dr.square(a - 0.5 * m) + dr.square(b - 0.5 * n) + 0.01), 0)
+                away2 = dr.square(a - 0.5 * m) + dr.square(b - 0.5 * n)
+                w = dr.select(own, dr.rcp(away2 + 0.01), 0)  # finite at the node itself
                 total, weight = dr.fma(mi.Array4f(w), value, total), weight + w
         total *= dr.rcp(dr.maximum(weight, 1e-30))
         return Known(total.x, total.y, error, active & (weight > 0))
@@ -160,6 +162,10 @@ class _Grid(NamedTuple):
         column = (square % across) * side + (patch % patches) * part + place % part
         row = (square // across) * side + (patch // patches) * part + place // part
         return row * self.columns + column, (row < rows) & (column < self.columns)
+
+    def pixel(self, x: Any, y: Any) -> Any:
+        """The index of the pixel that holds place (x, y) of these rows."""
+        return mi.UInt32(y) * self.pixels + mi.UInt32(x)
 
     def node(self, x: Any, y: Any, size: Any, m: int, n: int) -> Any:
         """The index of node (m, n) of 3 × 3 in the cell at pixel (x, y)."""
@@ -285,8 +291,7 @@ def _judged(nodes: _Nodes, grid: _Grid, x: Any, y: Any, size: int, finest: int, 
     else:
         serves &= (left <= missed) & (apart | (least > WIDE))
     if size == LARGEST:
-        lit = dr.square(own[0].x - 1) + dr.square(own[0].y) <= dr.square(rays)
-        ray = dr.select(same & apart & (most <= rays), dr.select(lit, mi.UInt32(2), 1), 0)
+        ray = dr.select(same & apart & (most <= rays), dr.select(own[0].x > 0.5, mi.UInt32(2), 1), 0)
         serves |= ray > 0
         off = dr.select(ray > 0, most, off)
     within = (IN_PIXEL if finest == 1 else 1) * missed
@@ -312,7 +317,7 @@ def _witnessed(
     u, v = WITNESS
     there = evaluate(mi.Float(x) + size * u, grid.top + mi.Float(y) + size * v)
     told = _sum(_gathered(nodes, grid, x, y, size), _quadratic(mi.Float(u)), _quadratic(mi.Float(v)))
-    real, imag = dr.select(ray > 0, mi.Float(ray) - 1, told.x), dr.select(ray > 0, 0, told.y)
+    real, imag = _or_ray(told, ray)
     off = dr.sqrt(dr.square(real - mi.Float(there.real)) + dr.square(imag - mi.Float(there.imag)))
     light = dr.minimum(dr.sqrt(dr.square(real) + dr.square(imag)), 1) + dr.opaque(mi.Float, shares.beside)
     missed, rays = dr.opaque(mi.Float, shares.missed), dr.opaque(mi.Float, shares.rays)
@@ -380,6 +385,11 @@ def _gathered(nodes: _Nodes, grid: _Grid, x: Any, y: Any, size: int) -> list[Any
 def _length(d: Any) -> Any:
     """|M| of a difference."""
     return dr.sqrt(dr.fma(d.x, d.x, d.y * d.y))
+
+
+def _or_ray(m: Any, ray: Any) -> tuple[Any, Any]:
+    """M of nodes, real and imaginary, or a ray's where it is that (`Cells.ray`)."""
+    return dr.select(ray > 0, mi.Float(ray) - 1, m.x), dr.select(ray > 0, 0, m.y)
 
 
 def _largest(differences: list[Any]) -> Any:

@@ -182,9 +182,9 @@ def _at_samples(light: Light, ask: Ask, sensor: Any, shot: Shot, first: int, pix
     dr.eval(values, found.holds, film, receivers)
     left: Any = dr.compress(receivers.active & ~found.holds)
     if len(left):
-        p, n, at = (dr.gather(type(v), v, left) for v in (receivers.p, receivers.n, film))
-        m = ask(at.x, at.y, Receivers(p, n, mi.Bool(True)))
-        for value, asked in zip(values, (m.real, m.imag, m.error), strict=True):
+        at = dr.gather(mi.Point2f, film, left)
+        m = ask(at.x, at.y, receivers.some(left))
+        for value, asked in zip(values, m[:3], strict=True):
             dr.scatter(value, asked, left)
     return Samples(rank, receivers.active, *values)
 

@@ -1,0 +1,314 @@
+"""Which outline pieces act on each block of receivers, found once for all of them (`lists`).
+
+What corners of far runs send inside is left out and counted. A piece whose fringes are finer than pixels everywhere in
+the block is on no list: it takes no part in means over pixels.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import drjit as dr
+import mitsuba
+import numpy as np
+
+from grimaldi.diffraction.corners import Corner, corner, slopes
+from grimaldi.diffraction.edges import cut_off, sounds
+from grimaldi.diffraction.frame import Frame, constant, frame
+from grimaldi.diffraction.grazing import Chords, Near, near, other_than, worth
+from grimaldi.diffraction.hierarchy import least_detour
+from grimaldi.diffraction.lists import List, Lists, places
+from grimaldi.diffraction.model import ACROSS, LATTICE, Blocks, Receivers
+from grimaldi.diffraction.occlusion import Rays
+from grimaldi.diffraction.segment import Corners
+from grimaldi.diffraction.table import Piece, Table
+from grimaldi.scene.model import Source
+
+mi: Any = mitsuba  # the stubs refuse numbers where arrays are asked for
+
+FINEST = 1.5  # cycles a pixel of fringes, from which on a picture's mean over pixels does without them,
+AVERAGED = 0.05  # at this tolerance and above; below, more in proportion
+CORNER = 0.007  # of the tolerance: |M| of a corner that is left out
+FINE = 1 << 16  # parts of its square, in which it is counted: sums of whole numbers are the same in any order
+WEAK = 0.3  # of the tolerance: |M| of an end that grows evenly between corners of cells which it reaches or not
+REMOTE = 1.5  # radii of a block, that such a piece is away from it at least
+ALL = (1 << ACROSS * ACROSS) - 1  # cells
+UNTESTED = 0.1  # of the tolerance: |M| of an end that reaches a block or not as a whole, by what its middle says
+
+
+class Search(NamedTuple):
+    """What is asked of pieces: the outlines, in Float32 or Float64, and what is allowed to be left out of M.
+
+    share: |M| below which a piece reaches all without a test; probe: rays X→P, None where nothing blocks them; grazing:
+    silhouettes that X→P may graze.
+    """
+
+    source: Source
+    tab: Table
+    k: Any
+    rule: Corners
+    tolerance: float
+    share: float
+    probe: Rays | None
+    grazing: Chords | None
+
+
+class _Pairs(NamedTuple):
+    """Blocks and pieces, each of which may act in the other."""
+
+    block: Any
+    piece: Any
+    index: Any  # of the pair among all
+
+
+class _Seen(NamedTuple):
+    """Pieces from the middles of blocks."""
+
+    open: Any  # whether it acts there
+    weak: Any  # whether a chain cut off on it leaves little everywhere in the block
+    far: Any  # whether leading terms serve everywhere in the block
+    inner2: Any  # sum of squares of what its inner corners send
+    start: Any  # C φ'/ψ' at its ends
+    stop: Any
+    passes: Any  # whether the way to the block grazes another body's silhouette
+
+
+def lists(search: Search, blocks: Blocks) -> Lists:
+    """What acts on each block."""
+    tab, tolerance = search.tab, search.tolerance
+    n, number = int(tab.n_pieces[0]), dr.width(blocks.p)
+    pairs = _pairs(search, blocks, n)
+    beside = _beside(search, blocks)
+    seen = _look(search, blocks, pairs, beside)
+
+    # where a piece reaches this block but not the next in the same plane, it may not reach all of it
+    open_, closed = dr.zeros(mi.Bool, number * n), dr.zeros(mi.Bool, number * n)
+    dr.scatter(open_, seen.open, pairs.index)
+    dr.scatter(closed, ~seen.open, pairs.index)
+    curved = dr.gather(mi.Float, blocks.bend, pairs.block) > 0
+    changes = mi.Bool(curved)
+    for side in blocks.beside:
+        other = dr.gather(mi.UInt32, side, pairs.block) * n + pairs.piece
+        changes |= dr.select(seen.open, dr.gather(mi.Bool, closed, other), dr.gather(mi.Bool, open_, other))
+    limit = 2 * np.pi * tolerance
+    faint = seen.far & (dr.maximum(dr.abs(seen.start), dr.abs(seen.stop)) < UNTESTED * limit)
+    tested = curved | (changes & ~faint) | seen.passes
+    dropped = seen.open & ~tested & seen.far & (seen.inner2 < dr.square(CORNER * limit))
+    kept = seen.open & ~tested & ~dropped
+    dr.eval(tested, kept, dropped)
+
+    # runs of neighbours
+    last = len(pairs.index) - 1
+    at = dr.arange(mi.UInt32, last + 1)
+    before, after = dr.maximum(at, 1) - 1, dr.minimum(at + 1, last)
+    follows = dr.gather(mi.Bool, tab.follows, pairs.piece) & (
+        dr.gather(mi.UInt32, pairs.index, before) + 1 == pairs.index
+    )
+    turn = seen.start - dr.gather(mi.Float, seen.stop, before)
+    joint = follows & dropped & dr.gather(mi.Bool, dropped, before) & (dr.abs(turn) < CORNER * limit)
+    along = follows & kept & dr.gather(mi.Bool, kept, before)
+    dr.eval(joint, along)
+    goes_on = (at < last) & dr.gather(mi.Bool, along, after)
+    begins, stops = dropped & ~joint, dropped & ~((at < last) & dr.gather(mi.Bool, joint, after))
+    strong = dr.abs(seen.start) >= CORNER * limit, dr.abs(seen.stop) >= CORNER * limit
+    left2 = dr.select(dropped, seen.inner2, 0) + dr.select(joint, dr.square(turn), 0)
+    left2 += dr.select(begins & ~strong[0], dr.square(seen.start), 0)
+    left2 += dr.select(stops & ~strong[1], dr.square(seen.stop), 0)
+    unit = (CORNER * limit) ** 2 / FINE
+    left = dr.zeros(mi.UInt64, number)
+    dr.scatter_add(left, mi.UInt64(dr.ceil(left2 / unit)), pairs.block)
+    first, end = tab.range(pairs.piece)
+    asked, reached = _verdicts(search, blocks, pairs, tested, seen)
+    some = (asked | reached) != 0
+    place = places(some)
+    dr.eval(begins, stops, first, end, goes_on, some)
+    return Lists(
+        List.of(some, pairs.block, number, pairs.piece),
+        dr.gather(mi.UInt32, asked, place),
+        dr.gather(mi.UInt32, reached, place),
+        List.of(kept & ~along, pairs.block, number, first),
+        List.of(kept & ~goes_on, pairs.block, number, end - 1),
+        List.of(begins & strong[0], pairs.block, number, first),
+        List.of(stops & strong[1], pairs.block, number, end - 1),
+        dr.sqrt(mi.Float(left) * unit) / (2 * np.pi),
+        beside,
+    )
+
+
+def _pairs(search: Search, blocks: Blocks, n: int) -> _Pairs:
+    """Which of n pieces may act somewhere in a block: within the outlines' reach, and above some horizon."""
+    tab = search.tab
+    index = dr.arange(mi.UInt32, dr.width(blocks.p) * n)
+    block = index // n
+    piece = tab.piece(index - block * n)
+    fr = frame(search.source, dr.gather(type(blocks.p), blocks.p, block), tab)
+    radius = tab.types.Float(dr.gather(mi.Float, blocks.radius, block))
+    bend = tab.types.Float(dr.gather(mi.Float, blocks.bend, block))
+    normal = tab.types.Vector(dr.gather(type(blocks.n), blocks.n, block))
+    d = fr.foot + fr.z2 * fr.a - piece.middle
+    acts = dr.gather(mi.Bool, blocks.active, block)
+    acts &= least_detour(fr, piece.middle, piece.reach + radius) <= tab.far
+    acts &= dr.select(bend == 0, sounds(fr, piece, normal), dr.dot(normal, d) < radius + bend * dr.norm(d))
+    acts &= _finest(fr, search.k, blocks, block, piece) <= FINEST * max(AVERAGED / search.tolerance, 1.0)
+    found = places(acts)
+    block = found // n
+    dr.eval(found, block)
+    return _Pairs(block, found - block * n, found)
+
+
+def _finest(fr: Frame, k: Any, blocks: Blocks, block: Any, piece: Piece) -> Any:
+    """Cycles a pixel of a piece's fringes with the direct light, along rows or columns, where a block has the widest.
+
+    ∇Δ at P is the direction X→P less that of S→P.
+    """
+    V, corners = type(piece.middle), LATTICE * LATTICE
+    right, down = (dr.gather(type(v), v, block) for v in (blocks.right, blocks.down))
+    least = type(piece.reach)(dr.inf)
+    P = fr.foot + fr.z2 * fr.a - piece.middle
+    middle = dr.gather(type(blocks.p), blocks.p, block)
+    for i in (0, LATTICE - 1, corners // 2, corners - LATTICE, corners - 1):
+        d = P + V(dr.gather(type(blocks.lattice), blocks.lattice, block * corners + i) - middle)
+        slope = d / dr.norm(d) - fr.a
+        least = dr.minimum(least, dr.maximum(dr.abs(dr.dot(V(right), slope)), dr.abs(dr.dot(V(down), slope))))
+    return least * k / (2 * np.pi)
+
+
+def _beside(search: Search, blocks: Blocks) -> Near | None:
+    """The bodies whose silhouettes rays to each block pass closest by."""
+    if search.grazing is None:
+        return None
+    middle = Receivers(blocks.p, blocks.n, blocks.active)
+    fr = frame(search.source, blocks.p, search.tab)
+    found = near(fr, search.grazing, search.k, middle, search.tab.types.Float(blocks.radius))
+    dr.eval(found.body, found.v2, found.next_body, found.next_v2)
+    return found
+
+
+def _look(search: Search, blocks: Blocks, pairs: _Pairs, beside: Near | None) -> _Seen:
+    """Each piece from the middle of its block."""
+    V = search.tab.types.Vector
+    p = dr.gather(type(blocks.p), blocks.p, pairs.block)
+    normal = dr.gather(type(blocks.n), blocks.n, pairs.block)
+    radius = search.tab.types.Float(dr.gather(mi.Float, blocks.radius, pairs.block))
+    x = mi.Point3f(p)
+    if search.probe is not None:
+        x = x + search.probe.epsilon(x) * normal
+    by = None
+    if beside is not None and search.grazing is not None:
+        by = beside.of(pairs.block, mi.Bool(True), search.grazing)
+    fr = frame(search.source, p, search.tab)
+    open_, weak, far, inner2, start, stop, passes = _from_middle(search, fr, pairs.piece, x, V(normal), radius, by)
+    seen = _Seen(open_, weak, far, mi.Float(inner2), mi.Float(start), mi.Float(stop), passes)
+    dr.eval(*seen)
+    return seen
+
+
+@dr.syntax
+def _from_middle(
+    search: Search, fr: Frame, i: Any, p: Any, n: Any, radius: Any, beside: Near | None
+) -> tuple[Any, ...]:
+    """What is in `_Seen`, along pieces i, for receivers within `radius` of P."""
+    tab, k, probe = search.tab, search.k, search.probe
+    F = tab.types.Float
+    U = dr.uint32_array_t(F)
+    piece = tab.piece(i)
+    acts = sounds(fr, piece, n)
+    clear = dr.mask_t(F)(acts)
+    size = cut_off(fr, piece, k)
+    if dr.hint(probe is not None, mode="scalar"):
+        assert probe is not None
+        tested = acts & (size > search.share)
+        if tested:
+            x = mi.Point3f(piece.middle + constant(tab.types.Vector, tab.centre))
+            clear = acts & probe.reaches(x, piece, p, tested)
+    far = dr.mask_t(F)(True)
+    room = piece._replace(reach=piece.reach + radius)
+    weak = (cut_off(fr, room, k) < WEAK * search.tolerance) & (
+        dr.squared_norm(fr.foot + fr.z2 * fr.a - piece.middle) > dr.square(REMOTE * radius)
+    )
+    inner2, start, stop = F(0), F(0), F(0)
+    j = U(piece.first)
+    last = tuple(corner(fr, tab.corner(j, 0), k))
+    while j < piece.end:
+        a, b = Corner(*last), corner(fr, tab.corner(j, 1), k)
+        at = slopes(fr.a, a, b, k)
+        margin = k * radius * dr.sqrt(at.length2) * dr.rsqrt(dr.minimum(a.to_p2, b.to_p2))
+        least = dr.minimum(dr.abs(at.a), dr.abs(at.b)) - margin
+        far &= (at.a * at.b > 0) & (least > 0) & (dr.minimum(a.d2, b.d2) > 4 * dr.square(radius))
+        far &= dr.square(least) > 2 * search.rule.far * k * at.length2 * dr.maximum(a.inv, b.inv)
+        end_a, end_b = at.turn * a.C / (a.d2 * at.a), at.turn * b.C / (b.d2 * at.b)
+        begins = j == piece.first
+        inner2 += dr.select(begins, 0, dr.square(end_a - stop))
+        start = dr.select(begins, end_a, start)
+        stop = end_b
+        last = tuple(b)
+        j += 1
+    passes = dr.mask_t(F)(False)
+    if dr.hint(beside is not None, mode="scalar"):
+        assert beside is not None
+        _, v2, close = other_than(beside, piece)
+        if close:
+            passes = worth(size, v2, search.tolerance)
+    return clear, weak, far, inner2, start, stop, passes
+
+
+def _verdicts(search: Search, blocks: Blocks, pairs: _Pairs, tested: Any, seen: _Seen) -> tuple[Any, Any]:
+    """Of pieces that are `tested`, the cells of blocks where to ask for them, and the corners of cells they reach.
+
+    By a ray to each corner. A cell is to be asked where its corners differ, if the piece is not too weak for that, or
+    where they lie on another surface; and all of them for what passes other silhouettes.
+    """
+    asked, reached = dr.zeros(mi.UInt32, len(tested)), dr.zeros(mi.UInt32, len(tested))
+    pair: Any = dr.compress(tested)
+    if len(pair) == 0:
+        return asked, reached
+    if search.probe is None:
+        dr.scatter(asked, mi.UInt32(ALL), pair)
+        return asked, reached
+    corners = LATTICE * LATTICE
+    index = dr.arange(mi.UInt32, len(pair) * corners)
+    entry = index // corners
+    place = index - entry * corners
+    seen_there = _reached(search, search.probe, blocks, pairs, dr.gather(mi.UInt32, pair, entry), place)
+    bits = dr.block_sum(dr.select(seen_there, mi.UInt32(1) << place, 0), corners)
+    members = dr.gather(mi.UInt32, blocks.members, dr.gather(mi.UInt32, pairs.block, pair))
+    weak = dr.gather(mi.Bool, seen.weak, pair)
+    filled, known = _filled(bits, members)
+    ask = mi.UInt32(0)
+    for y in range(ACROSS):
+        for x in range(ACROSS):
+            own = sum(1 << ((y + dy) * LATTICE + x + dx) for dy in (0, 1) for dx in (0, 1))
+            same = ((bits & own) == own) | ((bits & own) == 0)
+            tells = dr.select(weak, (known & own) == own, same & ((members & own) == own))
+            ask |= dr.select(tells, 0, 1 << (y * ACROSS + x))
+    bits = dr.select(weak, filled, bits)
+    dr.scatter(asked, dr.select(dr.gather(mi.Bool, seen.passes, pair), ALL, ask), pair)
+    dr.scatter(reached, bits, pair)
+    dr.eval(asked, reached)
+    return asked, reached
+
+
+def _filled(bits: Any, members: Any) -> tuple[Any, Any]:
+    """Bits of a lattice's corners that are no members as those of members beside them, and which have any beside."""
+    column = [sum(1 << (row * LATTICE + x) for row in range(LATTICE)) for x in range(LATTICE)]
+    inner = ((1 << LATTICE * LATTICE) - 1) ^ column[0]
+
+    def beside(flags: Any) -> Any:
+        flags = flags | ((flags << 1) & inner) | ((flags >> 1) & (inner >> 1))
+        return flags | (flags << LATTICE) | (flags >> LATTICE)
+
+    known = members | beside(members)
+    return (bits & members) | (beside(bits & members) & ~members), known
+
+
+def _reached(search: Search, probe: Rays, blocks: Blocks, pairs: _Pairs, pair: Any, place: Any) -> Any:
+    """Whether pieces reach corners of cells of blocks."""
+    tab = search.tab
+    at = dr.gather(mi.UInt32, pairs.block, pair) * LATTICE**2 + place
+    p = dr.gather(type(blocks.lattice), blocks.lattice, at)
+    n = dr.gather(type(blocks.normals), blocks.normals, at)
+    piece = tab.piece(dr.gather(mi.UInt32, pairs.piece, pair))
+    acts = sounds(frame(search.source, p, tab), piece, tab.types.Vector(n))
+    x = mi.Point3f(piece.middle + constant(tab.types.Vector, tab.centre))
+    q = mi.Point3f(p)
+    return acts & probe.reaches(x, piece, q + probe.epsilon(q) * n, acts)
