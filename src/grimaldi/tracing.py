@@ -10,6 +10,7 @@ import mitsuba as mi
 
 from grimaldi.light import Reflected
 from grimaldi.scene.sources import diffracts
+from grimaldi.variants import end_kernel, on_cuda
 
 
 class Path(NamedTuple):
@@ -43,6 +44,7 @@ def trace(
     """
     ordinary = ordinary_emitters(scene)
     limit = 0xFFFFFFFF if max_depth < 0 else max_depth
+    mode = "evaluated" if on_cuda() else None
 
     # --------------------- Loop state ----------------------
     ray = mi.Ray3f(ray)
@@ -58,8 +60,9 @@ def trace(
     pdf_prev = mi.Float(1)
     delta_prev = mi.Bool(True)
 
-    while active:
+    while dr.hint(active, mode=mode):
         si = scene.ray_intersect(ray, mi.RayFlags.All, depth == 0, active)
+        end_kernel(si)
         bsdf = si.bsdf(ray)
 
         # ---------------------- Emission ----------------------
@@ -89,6 +92,7 @@ def trace(
             imag = _where(first, out.imag, imag)
             error = _where(first, out.error, error)
         seen |= scatters
+        end_kernel(L, real, imag, error)
 
         # ---------------------- Ordinary emitters ----------------------
         if dr.hint(len(ordinary) > 0, mode="scalar"):

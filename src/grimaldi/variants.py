@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import platform
 import sys
-from typing import Literal
+from typing import Any, Literal
 
 import _grimaldi_libllvm as libllvm
 from grimaldi.errors import InputError
@@ -44,6 +44,24 @@ def best_variant(kind: Literal["rgb", "mono"]) -> str:
 
     backend = "cuda" if dr.has_backend(dr.JitBackend.CUDA) else "llvm"
     return f"{backend}_ad_{kind}"
+
+
+def on_cuda() -> bool:
+    """Whether the variant in use computes on a GPU."""
+    import mitsuba as mi
+
+    return (mi.variant() or "").startswith("cuda")
+
+
+def end_kernel(*values: Any) -> None:
+    """On CUDA, compute Dr.Jit arrays now: a kernel of OptiX traces rays in one scene, and light's and camera's differ.
+
+    Elsewhere nothing is done, so that one kernel holds both.
+    """
+    import drjit as dr
+
+    if on_cuda():
+        dr.eval(values)
 
 
 def libllvm_problem() -> str | None:

@@ -127,11 +127,12 @@ def sight(light: Light, sensor: Any, shot: Shot, x: Any, y: Any) -> tuple[Sight,
 def _nodes(light: Light, ask: Ask, sensor: Any, shot: Shot, x: Any, y: Any) -> Nodes:
     """M at what the camera sees at places of the film [pixels]."""
     (ray, receivers, shape), si = sight(light, sensor, shot, x, y)
-    m = ask(x, y, receivers)
     n = receivers.n
     pixel = mi.Float(0)
     for o, d in ((ray.o_x, ray.d_x), (ray.o_y, ray.d_y)):
         pixel = dr.maximum(pixel, dr.norm(o + d * (dr.dot(n, si.p - o) / dr.dot(n, d)) - si.p))
+    dr.eval(receivers, si.t, shape, pixel)  # the camera's rays in a kernel of their own
+    m = ask(x, y, receivers)
     return Nodes(mi.Float(m.real), mi.Float(m.imag), mi.Float(m.error), si.t, shape, mi.Float(m.clearance) / pixel)
 
 
