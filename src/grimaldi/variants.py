@@ -12,11 +12,12 @@ from grimaldi.errors import InputError
 
 
 def ensure_variant(kind: Literal["rgb", "mono"]) -> str:
-    """The name of Mitsuba's variant, set to the best one of `kind` if none is set yet.
+    """The name of Mitsuba's variant, set to the best one of `kind` if none is set yet; on CUDA exact in Float64.
 
     Raises InputError where waves cannot be computed in that variant, and where it needs a libLLVM and
     none works: older ones than 17 abort the process in the middle of a kernel.
     """
+    import drjit as dr
     import mitsuba as mi
 
     name = mi.variant() or best_variant(kind)
@@ -27,6 +28,8 @@ def ensure_variant(kind: Literal["rgb", "mono"]) -> str:
             raise InputError(problem)
     if mi.variant() is None:
         mi.set_variant(name)
+    if on_cuda():
+        dr.set_flag(dr.JitFlag.FastMath, False)  # with it CUDA's reciprocals and roots of Float64 have 20 bits
     return name
 
 

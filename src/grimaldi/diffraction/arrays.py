@@ -56,11 +56,6 @@ def on_device(kind: Any, number: float) -> Any:
     return dr.opaque(kind, number)
 
 
-def inverse_root(x: Any) -> Any:
-    """1/√x to the precision of x: CUDA's own instruction has 20 bits in Float64 too."""
-    return dr.rcp(dr.sqrt(x)) if dr.itemsize_v(x) == 8 else dr.rsqrt(x)
-
-
 def types(double: bool) -> Types:
     """Float64 or Float32 arrays of the variant in use."""
     variant = mi.variant() or ""

@@ -12,7 +12,6 @@ from typing import Any
 import drjit as dr
 import numpy as np
 
-from grimaldi.diffraction.arrays import inverse_root
 from grimaldi.diffraction.frame import Frame
 from grimaldi.diffraction.segment import Line, Wave, detour, growth, path
 
@@ -51,6 +50,6 @@ def damped(wave: Wave, frame: Frame, ln: Line, length: Any, radius: Any, k: Any)
 def _height(frame: Frame, ln: Line) -> Any:
     """P's distance from the plane through S and the line: s sin γ."""
     if frame.plane:
-        return dr.abs(ln.kappa) * inverse_root(ln.eqq)
+        return dr.abs(ln.kappa) * dr.rsqrt(ln.eqq)
     from_source = dr.squared_norm((frame.z1 + ln.h) * ln.eq - ln.ea * ln.q0) + ln.kappa * ln.kappa
-    return dr.abs(ln.kappa) * (frame.z1 + frame.z2) * inverse_root(from_source)
+    return dr.abs(ln.kappa) * (frame.z1 + frame.z2) * dr.rsqrt(from_source)

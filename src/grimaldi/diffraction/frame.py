@@ -8,7 +8,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from grimaldi.diffraction.arrays import inverse_root, on_device, types
+from grimaldi.diffraction.arrays import on_device, types
 from grimaldi.scene.model import Source, Spot, Vector
 from grimaldi.scene.planar import PlanarOutline
 
@@ -78,7 +78,7 @@ def frame(source: Source, p: Any, table: Table, screen: PlanarOutline | None = N
 def way(z: Any, d2: Any) -> tuple[Any, Any, Any]:
     """√(z² + d²) - z without cancellation, the same over √(z² + d²), and 1/√(z² + d²)."""
     length2 = dr.maximum(dr.fma(z, z, d2), 1e-30)
-    inv = inverse_root(length2)
+    inv = dr.rsqrt(length2)
     reach = length2 * inv + dr.abs(z)
     excess = dr.select(z > 0, d2 / reach, reach)
     return excess, excess * inv, inv

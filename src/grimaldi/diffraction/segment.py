@@ -19,7 +19,6 @@ from typing import Any, NamedTuple
 import drjit as dr
 import numpy as np
 
-from grimaldi.diffraction.arrays import inverse_root
 from grimaldi.diffraction.frame import Frame
 
 
@@ -263,7 +262,7 @@ def _panels(st: Path, first: Any, middle: Any, last: Any, rule: Rule) -> Any:
             inv = dr.rcp(ev)
             Y = st.A * dr.square(0.5 * (ev - inv))
             near = dr.fma(Y, inv_B, 1) * dr.fma(Y, st.u2, 1) * dr.fma(Y, st.u3, 1)
-            amplitude = (w_j * weight) * inverse_root(near) * dr.rcp(0.5 * (ev + inv) * dr.fma(Y, st.u1, 1))
+            amplitude = (w_j * weight) * dr.rsqrt(near) * dr.rcp(0.5 * (ev + inv) * dr.fma(Y, st.u1, 1))
             sin, cos = dr.sincos(Y)
             real = dr.fma(amplitude, cos, real)
             imag = dr.fma(amplitude, sin, imag)
@@ -296,7 +295,7 @@ def _tail(frame: Frame, st: Path, Y: Any, rule: Rule) -> tuple[Any, Any]:
         real = dr.fma(x, inv, real)
         imag = dr.fma(y, inv, imag)
     scale = 0.5 * c * dr.sqrt(st.A * a * st.B * b)
-    scale *= dr.rcp(dr.fma(st.u1, Y, 1)) * inverse_root(dr.fma(st.u2, Y, 1) * dr.fma(st.u3, Y, 1))
+    scale *= dr.rcp(dr.fma(st.u1, Y, 1)) * dr.rsqrt(dr.fma(st.u2, Y, 1) * dr.fma(st.u3, Y, 1))
     # i (real - i imag) e^{iY}
     sin, cos = sincos(Y)
     return scale * (imag * cos - real * sin), scale * (real * cos + imag * sin)

@@ -131,7 +131,7 @@ def _nodes(light: Light, ask: Ask, sensor: Any, shot: Shot, x: Any, y: Any) -> N
     pixel = mi.Float(0)
     for o, d in ((ray.o_x, ray.d_x), (ray.o_y, ray.d_y)):
         pixel = dr.maximum(pixel, dr.norm(o + d * (dr.dot(n, si.p - o) / dr.dot(n, d)) - si.p))
-    dr.eval(receivers, si.t, shape, pixel)  # the camera's rays in a kernel of their own
+    dr.eval(*receivers, si.t, shape, pixel)  # the camera's rays in a kernel of their own
     m = ask(x, y, receivers)
     return Nodes(mi.Float(m.real), mi.Float(m.imag), mi.Float(m.error), si.t, shape, mi.Float(m.clearance) / pixel)
 
@@ -180,7 +180,7 @@ def _at_samples(light: Light, ask: Ask, sensor: Any, shot: Shot, first: int, pix
     (_, receivers, shape), si = sight(light, sensor, shot, film.x, film.y)
     found = cells.beside(film.x, film.y, si.t, shape, receivers.active)
     values = [mi.Float64(v) for v in found[:3]]
-    dr.eval(values, found.holds, film, receivers)
+    dr.eval(values, found.holds, film, *receivers)
     left: Any = dr.compress(receivers.active & ~found.holds)
     if len(left):
         at = dr.gather(mi.Point2f, film, left)
