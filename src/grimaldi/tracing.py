@@ -44,7 +44,7 @@ def trace(
     """
     ordinary = ordinary_emitters(scene)
     limit = 0xFFFFFFFF if max_depth < 0 else max_depth
-    mode = "evaluated" if on_cuda() else None
+    mode = "evaluated" if on_cuda() else None  # a loop that is recorded cannot end kernels
 
     # --------------------- Loop state ----------------------
     ray = mi.Ray3f(ray)

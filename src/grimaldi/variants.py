@@ -12,8 +12,9 @@ from grimaldi.errors import InputError
 
 
 def ensure_variant(kind: Literal["rgb", "mono"]) -> str:
-    """The name of Mitsuba's variant, set to the best one of `kind` if none is set yet; on CUDA exact in Float64.
+    """The name of Mitsuba's variant, set to the best one of `kind` if none is set yet.
 
+    On CUDA Dr.Jit's fast math is turned off.
     Raises InputError where waves cannot be computed in that variant, and where it needs a libLLVM and
     none works: older ones than 17 abort the process in the middle of a kernel.
     """

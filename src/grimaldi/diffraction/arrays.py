@@ -9,7 +9,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from grimaldi.variants import check_variant
+from grimaldi.variants import check_variant, on_cuda
 
 ALIGNED = 128  # bytes
 
@@ -58,9 +58,8 @@ def on_device(kind: Any, number: float) -> Any:
 
 def types(double: bool) -> Types:
     """Float64 or Float32 arrays of the variant in use."""
-    variant = mi.variant() or ""
-    check_variant(variant)
-    ad = dr.cuda.ad if variant.startswith("cuda") else dr.llvm.ad
+    check_variant(mi.variant() or "")
+    ad = dr.cuda.ad if on_cuda() else dr.llvm.ad
     if double:
         return Types(ad.Float64, ad.Array3f64, ad.Array4f64)
     return Types(ad.Float, ad.Array3f, ad.Array4f)
