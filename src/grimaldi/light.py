@@ -6,7 +6,6 @@ import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from hashlib import blake2b
-from itertools import zip_longest
 from typing import Any, NamedTuple
 
 import drjit as dr
@@ -100,11 +99,11 @@ class Light:
         bsdf: Any,
         n: Any,
         active: Any,
-        known: Sequence[tuple[Factor, Any]] = (),
+        known: Sequence[tuple[Factor, Any | None]] = (),
     ) -> Reflected:
         """Eq. 3a where rays met surfaces: radiance back along them, and U of each key.
 
-        known: M of each beam, and where it holds; elsewhere it is asked of the model.
+        known: M of each beam, and where it holds (None: wherever it is needed); elsewhere the model is asked.
         """
         p = self.hits.point(ray, si, active)
         receivers = Receivers(p, n, active)
@@ -112,8 +111,10 @@ class Light:
         zero = type(p.x)(0)
         real, imag, error = ([zero] * len(self.keys) for _ in range(3))
         amplitudes = [(mi.UnpolarizedSpectrum(0), mi.UnpolarizedSpectrum(0)) for _ in self.keys]
-        for beam, found in zip_longest(self.beams, known):
-            m = beam.factor(receivers) if found is None else _unless(found[0], found[1], beam, receivers)
+        for i, beam in enumerate(self.beams):
+            m, holds = known[i] if known else (beam.factor(receivers), None)
+            if holds is not None:
+                m = _unless(m, holds, beam, receivers)
             u = beam.times(receivers, m)
             wo = si.to_local(toward(beam.source, si.p))
             f = mi.unpolarized_spectrum(bsdf.eval(context, si, wo, active))

@@ -47,6 +47,7 @@ mi: Any = mitsuba  # the stubs refuse numbers where arrays are asked for
 
 AS_ONE = 4.0  # rad at a tolerance of 1: half of what a run of pieces subtends that is tested by one ray X→P
 LOOSE = 5e-3  # tolerance from which on blocks have lists: thin shadows that they miss are steps in M of some percent
+BESIDE = 1e-2  # share of the way to a corner, up to which rounding beside it is like anywhere
 UNASKED = 0.3  # of the tolerance: what all pieces whose X→P goes untested may add to M, each the same
 
 
@@ -138,7 +139,8 @@ def _rounding(tab: Table, fr: Frame, k: float, margins: Margins) -> Any:
     """What rounded coordinates do to M.
 
     They shift edges: M changes by as much as over that way across the rim (eq. 8), or, a few λ from S or P, by the
-    angle that it subtends there. Through a corner in Float32 the edges that meet there may disagree: all bets are off.
+    angle that it subtends there. Beside a corner in Float32 the edges that meet there disagree by up to the shift over
+    the way to it.
     """
     F = tab.types.Float
     shift = dr.epsilon(F) * (10 * fr.lever + tab.device(tab.reach))
@@ -146,7 +148,8 @@ def _rounding(tab: Table, fr: Frame, k: float, margins: Margins) -> Any:
     error = 4 * dr.epsilon(F) + 2 * shift * (dr.sqrt(near * tab.device(k / (2 * np.pi))) + near / np.pi)
     if dr.itemsize_v(F) == 8:
         return error
-    return dr.select(margins.ray2 > dr.square(100 * shift), error, 1)
+    corner = dr.minimum(shift * dr.rsqrt(margins.ray2), 1)
+    return dr.select(corner > BESIDE, dr.maximum(error, corner), error)
 
 
 def _planar(problem: Problem, precision: Types) -> Evaluate:

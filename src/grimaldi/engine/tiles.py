@@ -190,16 +190,55 @@ def _at_samples(light: Light, ask: Ask, sensor: Any, shot: Shot, first: int, pix
     return Samples(rank, receivers.active, *values)
 
 
+class _Traced(NamedTuple):
+    """What samples of a tile brought: radiance of the channels, whether all of it is finite, and what `Path` tells."""
+
+    radiance: list[Any]
+    finite: Any
+    seen: Any
+    real: list[Any]
+    imag: list[Any]
+    error: list[Any]
+
+    def put(self, some: _Traced, index: Any) -> None:
+        """Replace what samples brought."""
+        dr.scatter(self.finite, some.finite, index)
+        dr.scatter(self.seen, some.seen, index)
+        for own, new in zip((self.radiance, *self[3:]), (some.radiance, *some[3:]), strict=True):
+            for values, of_some in zip(own, new, strict=True):
+                dr.scatter(values, of_some, index)
+
+
 def render_tile(light: Light, sensor: Any, shot: Shot, first: int, pixels: int, band: Band | None = None) -> Tile:
     """Trace the samples of `pixels` pixels from `first` on; without a band M is asked for at every sample."""
-    scene = light.scene.mitsuba
-    index = dr.arange(mi.UInt32, pixels * shot.spp)
-    pixel = index // dr.opaque(mi.UInt32, shot.spp)
-    stream, film = _sample(shot, dr.opaque(mi.UInt32, first) + pixel, index % dr.opaque(mi.UInt32, shot.spp))
-    place = film / mi.Point2f(dr.opaque(mi.Float, shot.width), dr.opaque(mi.Float, shot.height))
     band = band or Band(0, shot.height, (), ())
     ways = zip(band.asks, band.cells, strict=True)
     single = [_at_samples(light, ask, sensor, shot, first, pixels, m) for ask, m in ways]
+    begin = partial(_traced, light, sensor, shot, first, band.cells, single)
+    index = dr.arange(mi.UInt32, pixels * shot.spp)
+    if not single or shot.max_depth != 2:
+        return _means(begin(index, asks=True), shot, first)
+    traced = begin(index, asks=False)  # M is known wherever the sources' light is asked for, but for few samples
+    left: Any = dr.compress(~traced.finite)
+    if len(left):
+        traced.put(begin(left, asks=True), left)
+    return _means(traced, shot, first)
+
+
+def _traced(
+    light: Light,
+    sensor: Any,
+    shot: Shot,
+    first: int,
+    cells: tuple[Cells, ...],
+    single: list[Samples],
+    index: Any,
+    asks: bool,
+) -> _Traced:
+    """Paths of samples of a tile; where M is not known it is NaN, if the model is not to be asked."""
+    pixel = index // dr.opaque(mi.UInt32, shot.spp)
+    stream, film = _sample(shot, dr.opaque(mi.UInt32, first) + pixel, index % dr.opaque(mi.UInt32, shot.spp))
+    place = film / mi.Point2f(dr.opaque(mi.Float, shot.width), dr.opaque(mi.Float, shot.height))
     time = sensor.shutter_open()
     if sensor.shutter_open_time() > 0:
         time += stream.next_1d() * sensor.shutter_open_time()
@@ -208,20 +247,17 @@ def render_tile(light: Light, sensor: Any, shot: Shot, first: int, pixels: int, 
 
     def reflected(ray: Any, si: Any, bsdf: Any, n: Any, active: Any, first: Any) -> Reflected:
         known = []
-        for m, samples in zip(band.cells, single, strict=True):
+        for m, samples in zip(cells, single, strict=True):
             shape: Any = dr.reinterpret_array(mi.UInt32, si.shape)
             found = m.at(film.x, film.y, si.t, shape, active & first)
             own = samples.at(pixel, index, shot.spp, active & first)
-            known.append(
-                (
-                    Factor(*(dr.select(own.holds, a, b) for a, b in zip(own[:3], found[:3], strict=True))),
-                    found.holds | own.holds,
-                )
-            )
+            holds = found.holds | own.holds
+            values = (dr.select(own.holds, a, b) for a, b in zip(own[:3], found[:3], strict=True))
+            known.append((Factor(*(dr.select(holds, v, dr.nan) for v in values)), holds if asks else None))
         return light.reflected(ray, si, bsdf, n, active, known)
 
     path = trace(
-        scene,
+        light.scene.mitsuba,
         stream,
         ray,
         reflected,
@@ -231,24 +267,29 @@ def render_tile(light: Light, sensor: Any, shot: Shot, first: int, pixels: int, 
         shot.hide_emitters,
         mi.Bool(True),
     )
-
     radiance = mi.unpolarized_spectrum(path.L * weight)
     finite = dr.all(dr.isfinite(radiance))
     for re, im in zip(path.real, path.imag, strict=True):
         finite &= dr.isfinite(re) & dr.isfinite(im)
-    seen = finite & path.seen
-    dr.eval(radiance, finite, seen, path.real, path.imag, path.error)  # all in one kernel
+    traced = _Traced(list(radiance), finite, path.seen, path.real, path.imag, path.error)
+    dr.eval(*traced)  # all in one kernel
+    return traced
+
+
+def _means(traced: _Traced, shot: Shot, first: int) -> Tile:
+    """What the samples of each pixel say."""
+    finite, seen = traced.finite, traced.finite & traced.seen
 
     def mean(values: Any, over: Any) -> Any:
         count = dr.block_sum(dr.select(over, mi.Float(1), 0), shot.spp)
         return dr.block_sum(dr.select(over, mi.Float(values), 0), shot.spp) / dr.maximum(count, 1)
 
-    picture = [mean(channel, finite) for channel in radiance]
-    real = [mean(x, seen) for x in path.real]
-    imag = [mean(x, seen) for x in path.imag]
-    error = [mean(x, seen) for x in path.error]
+    picture = [mean(channel, finite) for channel in traced.radiance]
+    real = [mean(x, seen) for x in traced.real]
+    imag = [mean(x, seen) for x in traced.imag]
+    error = [mean(x, seen) for x in traced.error]
     power = mi.Float64(0)
-    for re, im in zip(path.real, path.imag, strict=True):
+    for re, im in zip(traced.real, traced.imag, strict=True):
         power += re * re + im * im
     intensity = mean(power, seen)
     lost: Any = dr.count(~finite)

@@ -1,0 +1,68 @@
+"""Models recorded once and replayed: to trace one takes Python longer than its kernel takes for many a receiver."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from functools import partial
+from types import FunctionType, MethodType
+from typing import Any
+
+import drjit as dr
+import mitsuba
+
+from grimaldi.diffraction.model import Evaluate, Factor, Receivers
+from grimaldi.variants import on_cuda
+
+mi: Any = mitsuba  # the stubs refuse numbers where arrays are asked for
+
+
+def frozen(evaluate: Evaluate) -> Evaluate:
+    """The same model, evaluated at receivers: Float64 arrays."""
+
+    def asked(*receivers: Any) -> tuple[Any, ...]:
+        return tuple(mi.Float64(v) for v in evaluate(Receivers(*receivers)))
+
+    state = held(evaluate)
+    replayed = asked if on_cuda() else dr.freeze(asked, state_fn=lambda *_: state)
+
+    def evaluated(receivers: Receivers) -> Factor:
+        dr.make_opaque(*receivers)  # a literal would need a recording of its own
+        m = Factor(*replayed(*receivers))
+        dr.eval(*m)
+        return m
+
+    return evaluated
+
+
+def held(evaluate: Evaluate) -> tuple[Any, ...]:
+    """The arrays and scenes that a model's data and functions hold, however deep."""
+    found: list[Any] = []
+    seen: set[int] = set()
+
+    def visit(value: Any) -> None:
+        if id(value) in seen:
+            return
+        seen.add(id(value))
+        if dr.is_array_v(value) or isinstance(value, mi.Scene):
+            found.append(value)
+            return
+        for part in _parts(value):
+            visit(part)
+
+    visit(evaluate)
+    return tuple(found)
+
+
+def _parts(value: Any) -> Iterable[Any]:
+    """What plain data and functions hold."""
+    if isinstance(value, (tuple, list)):
+        return value
+    if isinstance(value, partial):
+        return value.func, *value.args
+    if isinstance(value, MethodType):
+        return (value.__self__,)
+    if isinstance(value, FunctionType):
+        return [cell.cell_contents for cell in value.__closure__ or ()]
+    if type(value).__module__.startswith("grimaldi."):
+        return list(vars(value).values())
+    return ()
