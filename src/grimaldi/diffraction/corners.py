@@ -88,14 +88,14 @@ def between(ray: Any, a: Corner, b: Corner, k: Any, rule: Corners) -> Ends:
     bend = slope_b - slope_a
 
     # short: Δφ = atan(turn / a·b), shared out so that dφ/dt is in the ratio of 1/d²
-    x = turn / dr.dot(a.q, b.q)
+    x = turn * dr.rcp(dr.dot(a.q, b.q))
     x2 = x * x
     phi = x * (1 - x2 * (1 / 3 - x2 / 5))
-    share = 2 * phi / (a.d2 + b.d2)
+    share = 2 * phi * dr.rcp(a.d2 + b.d2)
     delta = 0.5 * (slope_a + slope_b)
     re, im = _filon(delta, dr.fma(a.cos, b.cos, a.sin * b.sin), dr.fma(b.sin, a.cos, -b.cos * a.sin))
     # -i bend/2 ∫ x(1-x) e^{iδx} dx, about the middle of the phases
-    bent = bend / (24 * dr.square(dr.fma(delta, delta / 40, 1)))
+    bent = bend * dr.rcp(24 * dr.square(dr.fma(delta, delta * (1 / 40), 1)))
     im_a, im_b = im - bent, -im - bent
     near_a, near_b = share * b.d2 * a.C, share * a.d2 * b.C
     short_real = near_a * (re * a.cos - im_a * a.sin) + near_b * (re * b.cos - im_b * b.sin)
@@ -103,11 +103,10 @@ def between(ray: Any, a: Corner, b: Corner, k: Any, rule: Corners) -> Ends:
     is_short = (dr.abs(bend) < rule.bend) & (length2 < rule.near2 * dr.minimum(a.d2, b.d2))
 
     # far: i C φ'/ψ' e^{iψ} at a, less the same at b
-    end_a = turn * a.C / (a.d2 * slope_a)
-    end_b = turn * b.C / (b.d2 * slope_b)
-    is_far = (slope_a * slope_b > 0) & (
-        dr.minimum(dr.square(slope_a) / a.inv, dr.square(slope_b) / b.inv) > 2 * rule.far * k * length2
-    )
+    end_a = turn * a.C * dr.rcp(a.d2 * slope_a)
+    end_b = turn * b.C * dr.rcp(b.d2 * slope_b)
+    least = 2 * rule.far * k * length2
+    is_far = (slope_a * slope_b > 0) & (dr.square(slope_a) > least * a.inv) & (dr.square(slope_b) > least * b.inv)
     return Ends(
         dr.select(is_short, short_real, end_b * b.sin - end_a * a.sin),
         dr.select(is_short, short_imag, end_a * a.cos - end_b * b.cos),

@@ -80,7 +80,7 @@ def way(z: Any, d2: Any) -> tuple[Any, Any, Any]:
     length2 = dr.maximum(dr.fma(z, z, d2), 1e-30)
     inv = dr.rsqrt(length2)
     reach = length2 * inv + dr.abs(z)
-    excess = dr.select(z > 0, d2 / reach, reach)
+    excess = dr.select(z > 0, d2 * dr.rcp(reach), reach)
     return excess, excess * inv, inv
 
 

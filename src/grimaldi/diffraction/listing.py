@@ -26,7 +26,7 @@ from grimaldi.scene.model import Source
 
 mi: Any = mitsuba  # the stubs refuse numbers where arrays are asked for
 
-FINEST = 1.5  # cycles a pixel of fringes, from which on a picture's mean over pixels does without them,
+FINEST = 1.0  # cycles a pixel of fringes, from which on a picture's mean over pixels does without them,
 AVERAGED = 0.05  # at this tolerance and above; below, more in proportion
 CORNER = 0.007  # of the tolerance: |M| of a corner that is left out
 FINE = 1 << 16  # parts of its square, in which it is counted: sums of whole numbers are the same in any order

@@ -20,6 +20,7 @@ import drjit as dr
 import mitsuba
 
 from grimaldi.diffraction.model import ACROSS
+from grimaldi.engine.cubics import cubic, doubt
 
 mi: Any = mitsuba  # the stubs refuse numbers where arrays are asked for
 
@@ -29,9 +30,10 @@ AT_BEST = 1 / 16  # what it leaves of it at best: an eighth of a cubic's, less i
 STRAIGHT = 0.5  # what a quadratic leaves of a bilinear function's error, at most
 SIMPSON = 1 / 6, 4 / 6, 1 / 6  # means of quadratics
 OF_PIXEL = (
-    2  # times its share, that the mean over a pixel may be off by, where that is a cell: its neighbours err otherwise
+    1  # times its share, that the mean over a pixel may be off by, where that is a cell: its neighbours err otherwise
 )
-IN_PIXEL = 6  # times its share, that M may be off by within a pixel
+BY_CUBICS = 2  # times its share, that cubics and quadratics may be apart in a pixel that the former serve
+IN_PIXEL = 3  # times its share, that M may be off by within a pixel
 FAINT = 1.5  # times what |M - M of a ray| may be at nodes, that it may be at one more place
 WITNESS = 0.31, 0.64  # where in a cell M is asked for once more: fringes as wide as nodes are apart look like none
 WIDE = 0.1  # |M - M of a ray| at all nodes of a cell, above which fringes, and the rim among them, are wider than it
@@ -92,7 +94,8 @@ class Cells:
     error: Any
     ray: Any  # 1 + M where that is a ray's, 0 elsewhere
     mixed: Any  # the error of M in pixels without a cell, whose nodes lie on several shapes; infinite in others
-    unknown: int  # pixels that have none of both
+    cubic: Any  # the same in those that cubics serve
+    unknown: int  # pixels that have none of these
 
     def knows(self, x: Any, y: Any) -> Any:
         """Whether pixels (x, y) of the film have a cell."""
@@ -118,8 +121,27 @@ class Cells:
         real, imag = _or_ray(found, dr.gather(mi.UInt32, self.ray, pixel, holds))
         return Known(real, imag, dr.gather(mi.Float, self.error, pixel, holds), holds)
 
-    def beside(self, x: Any, y: Any, distance: Any, shape: Any, active: Any) -> Known:
-        """The same in pixels where several shapes meet: by the nodes on this one, nearer ones counting more."""
+    def elsewhere(self, x: Any, y: Any, distance: Any, shape: Any, active: Any) -> Known:
+        """The same in pixels without a cell."""
+        a = self._by_cubics(x, y, distance, shape, active)
+        b = self._beside(x, y, distance, shape, active)
+        return Known(*(dr.select(a.holds, m, n) for m, n in zip(a, b, strict=True)))
+
+    def _by_cubics(self, x: Any, y: Any, distance: Any, shape: Any, active: Any) -> Known:
+        """By the nodes in and about the pixel."""
+        y = y - self.grid.top
+        error = dr.gather(mi.Float, self.cubic, self.grid.pixel(x, y), active)
+        size = 1 << self.grid.shift
+        i, j = mi.UInt32(x) & ~mi.UInt32(size - 1), mi.UInt32(y) & ~mi.UInt32(size - 1)
+        holds = active & dr.isfinite(error)
+        holds &= dr.gather(mi.UInt32, self.shapes, self.grid.node(i, j, size, 0, 0), holds) == shape
+        u, v = (x - mi.Float(i)) / size, (y - mi.Float(j)) / size
+        found, room = cubic(self.nodes, self.grid.before(i, j), self.grid.columns, u, v, holds)
+        holds &= dr.abs(distance - found.z) <= dr.maximum(DEPTH * distance, 0.25 * room)
+        return Known(found.x, found.y, error, holds)
+
+    def _beside(self, x: Any, y: Any, distance: Any, shape: Any, active: Any) -> Known:
+        """Where several shapes meet: by the nodes on this one, nearer ones counting more."""
         y = y - self.grid.top
         pixel = self.grid.pixel(x, y)
         error = dr.gather(mi.Float, self.mixed, pixel, active)
@@ -170,6 +192,10 @@ class _Grid(NamedTuple):
     def node(self, x: Any, y: Any, size: Any, m: int, n: int) -> Any:
         """The index of node (m, n) of 3 × 3 in the cell at pixel (x, y)."""
         return ((2 * y + n * size) >> self.shift) * self.columns + ((2 * x + m * size) >> self.shift)
+
+    def before(self, x: Any, y: Any) -> Any:
+        """The index of the node before those of the finest cell at pixel (x, y), along rows and columns."""
+        return self.node(x, y, 1 << self.shift, 0, 0) - (self.columns + 1)
 
 
 class _Nodes(NamedTuple):
@@ -237,7 +263,7 @@ def cells(evaluate: Evaluate, width: int, top: int, rows: int, finest: int, shar
             break
         size //= 2
         x, y = _quarters(dr.gather(mi.UInt32, x, left), dr.gather(mi.UInt32, y, left), size)
-    return _by_pixel(nodes, grid, levels, across * LARGEST, down * LARGEST)
+    return _by_pixel(nodes, grid, levels, across * LARGEST, down * LARGEST, shares)
 
 
 def _fill(nodes: _Nodes, grid: _Grid, order: tuple[Any, Any], x: Any, y: Any, size: int, evaluate: Evaluate) -> None:
@@ -437,7 +463,7 @@ def _quarters(x: Any, y: Any, size: int) -> tuple[Any, Any]:
     return dr.gather(mi.UInt32, x, of) + (part & 1) * size, dr.gather(mi.UInt32, y, of) + ((part >> 1) & 1) * size
 
 
-def _by_pixel(nodes: _Nodes, grid: _Grid, levels: list[_Level], pixels: int, rows: int) -> Cells:
+def _by_pixel(nodes: _Nodes, grid: _Grid, levels: list[_Level], pixels: int, rows: int, shares: Shares) -> Cells:
     """Each pixel's cell."""
     index = dr.arange(mi.UInt32, pixels * rows)
     y = index // grid.pixels
@@ -452,6 +478,31 @@ def _by_pixel(nodes: _Nodes, grid: _Grid, levels: list[_Level], pixels: int, row
         mixed = dr.minimum(mixed, dr.gather(mi.Float, level.mixed, place))
     first = grid.node(x & ~(size - 1), y & ~(size - 1), size, 0, 0)
     shape = dr.gather(mi.UInt32, nodes.shape, first, size > 0)
-    unknown: Any = dr.count((size == 0) & ~dr.isfinite(mixed))
-    dr.eval(size, error, ray, mixed, shape, unknown)
-    return Cells(grid, nodes.values, nodes.shape, size, shape, error, ray, mixed, int(unknown[0]))
+    dr.eval(size, error, ray, mixed, shape)
+    by_cubics = dr.full(mi.Float, dr.inf, pixels * rows)
+    left: Any = dr.compress((size == 0) & ~dr.isfinite(mixed))
+    if len(left):
+        at = dr.gather(mi.UInt32, x, left), dr.gather(mi.UInt32, y, left)
+        dr.scatter(by_cubics, _cubics(nodes, grid, *at, pixels, rows, shares), left)
+    unknown: Any = dr.count((size == 0) & ~dr.isfinite(mixed) & ~dr.isfinite(by_cubics))
+    return Cells(grid, nodes.values, nodes.shape, size, shape, error, ray, mixed, by_cubics, int(unknown[0]))
+
+
+def _cubics(nodes: _Nodes, grid: _Grid, x: Any, y: Any, pixels: int, rows: int, shares: Shares) -> Any:
+    """M's error in pixels by cubics, infinite where these do not serve."""
+    size = 1 << grid.shift
+    x, y = x & ~mi.UInt32(size - 1), y & ~mi.UInt32(size - 1)
+    inside = (x > 0) & (y > 0) & (x + size < pixels) & (y + size < rows)
+    apart = doubt(nodes.values, nodes.shape, grid.before(x, y), grid.columns, inside)
+    error, light = mi.Float(0), mi.Float(0)
+    for n in range(3):
+        for m in range(3):
+            node = grid.node(x, y, size, m, n)
+            M = dr.gather(mi.Array4f, nodes.values, node)
+            error = dr.maximum(error, dr.gather(mi.Float, nodes.error, node))
+            light = dr.maximum(light, dr.fma(M.x, M.x, M.y * M.y))
+    light = dr.minimum(dr.sqrt(light), 1) + dr.opaque(mi.Float, shares.beside)
+    serves = (apart <= dr.opaque(mi.Float, shares.most)) & (
+        apart * (light + apart) <= BY_CUBICS * dr.opaque(mi.Float, shares.missed)
+    )
+    return dr.select(serves, error + apart, dr.inf)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import gc
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from functools import partial
 from types import FunctionType, MethodType
 from typing import Any
@@ -27,11 +29,24 @@ def frozen(evaluate: Evaluate) -> Evaluate:
 
     def evaluated(receivers: Receivers) -> Factor:
         dr.make_opaque(*receivers)  # a literal would need a recording of its own
-        m = Factor(*replayed(*receivers))
+        with _no_garbage_collected():
+            m = Factor(*replayed(*receivers))
         dr.eval(*m)
         return m
 
     return evaluated
+
+
+@contextmanager
+def _no_garbage_collected() -> Iterator[None]:
+    """While Dr.Jit records it cannot give back what NumPy lent it, and ends the process if it has to."""
+    collects = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if collects:
+            gc.enable()
 
 
 def held(evaluate: Evaluate) -> tuple[Any, ...]:
