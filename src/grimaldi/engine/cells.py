@@ -20,7 +20,7 @@ import drjit as dr
 import mitsuba
 
 from grimaldi.diffraction.model import ACROSS
-from grimaldi.engine.cubics import cubic, doubt
+from grimaldi.engine.cubics import apart, weights
 
 mi: Any = mitsuba  # the stubs refuse numbers where arrays are asked for
 
@@ -29,10 +29,8 @@ HALVED = 0.25  # what halving a cell leaves of a quadratic's error, at most
 AT_BEST = 1 / 16  # what it leaves of it at best: an eighth of a cubic's, less in quarters where M is straighter
 STRAIGHT = 0.5  # what a quadratic leaves of a bilinear function's error, at most
 SIMPSON = 1 / 6, 4 / 6, 1 / 6  # means of quadratics
-OF_PIXEL = (
-    1  # times its share, that the mean over a pixel may be off by, where that is a cell: its neighbours err otherwise
-)
-BY_CUBICS = 2  # times its share, that cubics and quadratics may be apart in a pixel that the former serve
+OF_PIXEL = 1  # times its share, that the mean over a pixel may be off by, where that is a cell
+BY_CUBICS = 1.75, 1  # times its share, that cubics and quadratics may be apart in a pixel, and in a larger cell
 IN_PIXEL = 3  # times its share, that M may be off by within a pixel
 FAINT = 1.5  # times what |M - M of a ray| may be at nodes, that it may be at one more place
 WITNESS = 0.31, 0.64  # where in a cell M is asked for once more: fringes as wide as nodes are apart look like none
@@ -93,9 +91,9 @@ class Cells:
     shape: Any  # what the cell shows
     error: Any
     ray: Any  # 1 + M where that is a ray's, 0 elsewhere
+    cubic: Any  # whether M is there by cubics, not quadratics
     mixed: Any  # the error of M in pixels without a cell, whose nodes lie on several shapes; infinite in others
-    cubic: Any  # the same in those that cubics serve
-    unknown: int  # pixels that have none of these
+    unknown: int  # pixels that have none of both
 
     def knows(self, x: Any, y: Any) -> Any:
         """Whether pixels (x, y) of the film have a cell."""
@@ -111,37 +109,15 @@ class Cells:
         holds &= dr.gather(mi.UInt32, self.shape, pixel, holds) == shape
         i, j = mi.UInt32(x) & ~(size - 1), mi.UInt32(y) & ~(size - 1)
         scale = dr.rcp(mi.Float(size))
-        index = [self.grid.node(i, j, size, m, n) for n in range(3) for m in range(3)]
-        values = [dr.gather(mi.Array4f, self.nodes, node, holds) for node in index]
-        found = _sum(values, _quadratic((x - mi.Float(i)) * scale), _quadratic((y - mi.Float(j)) * scale))
-        low, high = mi.Float(dr.inf), mi.Float(0)
-        for v in values:
-            low, high = dr.minimum(low, v.z), dr.maximum(high, v.z)
-        holds &= dr.abs(distance - found.z) <= dr.maximum(DEPTH * distance, 0.25 * (high - low))
+        cubic = dr.gather(mi.Bool, self.cubic, pixel, holds)
+        u, v = (x - mi.Float(i)) * scale, (y - mi.Float(j)) * scale
+        found, room = _told(self.nodes, self.grid, i, j, size, cubic, u, v, holds)
+        holds &= dr.abs(distance - found.z) <= dr.maximum(DEPTH * distance, 0.25 * room)
         real, imag = _or_ray(found, dr.gather(mi.UInt32, self.ray, pixel, holds))
         return Known(real, imag, dr.gather(mi.Float, self.error, pixel, holds), holds)
 
-    def elsewhere(self, x: Any, y: Any, distance: Any, shape: Any, active: Any) -> Known:
-        """The same in pixels without a cell."""
-        a = self._by_cubics(x, y, distance, shape, active)
-        b = self._beside(x, y, distance, shape, active)
-        return Known(*(dr.select(a.holds, m, n) for m, n in zip(a, b, strict=True)))
-
-    def _by_cubics(self, x: Any, y: Any, distance: Any, shape: Any, active: Any) -> Known:
-        """By the nodes in and about the pixel."""
-        y = y - self.grid.top
-        error = dr.gather(mi.Float, self.cubic, self.grid.pixel(x, y), active)
-        size = 1 << self.grid.shift
-        i, j = mi.UInt32(x) & ~mi.UInt32(size - 1), mi.UInt32(y) & ~mi.UInt32(size - 1)
-        holds = active & dr.isfinite(error)
-        holds &= dr.gather(mi.UInt32, self.shapes, self.grid.node(i, j, size, 0, 0), holds) == shape
-        u, v = (x - mi.Float(i)) / size, (y - mi.Float(j)) / size
-        found, room = cubic(self.nodes, self.grid.before(i, j), self.grid.columns, u, v, holds)
-        holds &= dr.abs(distance - found.z) <= dr.maximum(DEPTH * distance, 0.25 * room)
-        return Known(found.x, found.y, error, holds)
-
-    def _beside(self, x: Any, y: Any, distance: Any, shape: Any, active: Any) -> Known:
-        """Where several shapes meet: by the nodes on this one, nearer ones counting more."""
+    def beside(self, x: Any, y: Any, distance: Any, shape: Any, active: Any) -> Known:
+        """The same in pixels where several shapes meet: by the nodes on this one, nearer ones counting more."""
         y = y - self.grid.top
         pixel = self.grid.pixel(x, y)
         error = dr.gather(mi.Float, self.mixed, pixel, active)
@@ -193,9 +169,9 @@ class _Grid(NamedTuple):
         """The index of node (m, n) of 3 × 3 in the cell at pixel (x, y)."""
         return ((2 * y + n * size) >> self.shift) * self.columns + ((2 * x + m * size) >> self.shift)
 
-    def before(self, x: Any, y: Any) -> Any:
-        """The index of the node before those of the finest cell at pixel (x, y), along rows and columns."""
-        return self.node(x, y, 1 << self.shift, 0, 0) - (self.columns + 1)
+    def steps(self, size: Any) -> tuple[Any, Any]:
+        """From node to node of a cell, along rows and columns."""
+        return size >> self.shift, (size >> self.shift) * self.columns
 
 
 class _Nodes(NamedTuple):
@@ -218,16 +194,18 @@ class _Level(NamedTuple):
     serves: Any
     error: Any
     ray: Any
+    cubic: Any
     mixed: Any
 
 
 class _Verdict(NamedTuple):
-    """Whether cells serve, with M's error in them and as what (`Cells.ray`); what else is in `Cells.mixed`; and whether
-    parts of cells that do not serve may."""
+    """Whether cells serve, with M's error in them and as what (`ray`, `cubic` as in `Cells`); what else is in
+    `Cells.mixed`; and whether parts of cells that do not serve may."""
 
     serves: Any
     error: Any
     ray: Any
+    cubic: Any
     mixed: Any
     halved: Any
 
@@ -254,7 +232,9 @@ def cells(evaluate: Evaluate, width: int, top: int, rows: int, finest: int, shar
     size = LARGEST
     while True:
         _fill(nodes, grid, order, x, y, size, evaluate)
-        found = _judged(nodes, grid, x, y, size, finest, shares)
+        found = _judged(nodes, grid, x, y, size, finest, shares, down * LARGEST)
+        if size == finest:
+            found = _with_nodes_about(found, nodes, grid, order, x, y, size, evaluate, shares, down * LARGEST)
         if size > 1:
             found = _witnessed(found, nodes, grid, x, y, size, evaluate, shares)
         levels.append(_level(size, x, y, across * LARGEST // size, down * LARGEST // size, found))
@@ -263,15 +243,56 @@ def cells(evaluate: Evaluate, width: int, top: int, rows: int, finest: int, shar
             break
         size //= 2
         x, y = _quarters(dr.gather(mi.UInt32, x, left), dr.gather(mi.UInt32, y, left), size)
-    return _by_pixel(nodes, grid, levels, across * LARGEST, down * LARGEST, shares)
+    return _by_pixel(nodes, grid, levels, across * LARGEST, down * LARGEST)
 
 
-def _fill(nodes: _Nodes, grid: _Grid, order: tuple[Any, Any], x: Any, y: Any, size: int, evaluate: Evaluate) -> None:
-    """Ask for M at the nodes of cells that are not there yet, neighbours together: they are quicker so."""
-    asked = dr.zeros(mi.Bool, len(nodes.there))
+def _with_nodes_about(
+    found: _Verdict,
+    nodes: _Nodes,
+    grid: _Grid,
+    order: tuple[Any, Any],
+    x: Any,
+    y: Any,
+    size: int,
+    evaluate: Evaluate,
+    shares: Shares,
+    rows: int,
+) -> _Verdict:
+    """The verdict on the finest cells again, those that do not serve with all nodes that cubics take."""
+    shape = dr.gather(mi.UInt32, nodes.shape, grid.node(x, y, size, 0, 0))
+    same = shape > 0
     for n in range(3):
         for m in range(3):
-            dr.scatter(asked, mi.Bool(True), grid.node(x, y, size, m, n))
+            same &= dr.gather(mi.UInt32, nodes.shape, grid.node(x, y, size, m, n)) == shape
+    some: Any = dr.compress(~found.serves & same & _inside(grid, x, y, size, rows))
+    if len(some) == 0:
+        return found
+    x, y = dr.gather(mi.UInt32, x, some), dr.gather(mi.UInt32, y, some)
+    _fill(nodes, grid, order, x, y, size, evaluate, about=1)
+    for values, again in zip(found, _judged(nodes, grid, x, y, size, size, shares, rows), strict=True):
+        dr.scatter(values, again, some)
+    dr.eval(*found)
+    return found
+
+
+def _inside(grid: _Grid, x: Any, y: Any, size: int, rows: int) -> Any:
+    """Whether there are nodes on all sides of cells."""
+    return (x > 0) & (y > 0) & (x + size < grid.pixels) & (y + size < rows)
+
+
+def _fill(
+    nodes: _Nodes, grid: _Grid, order: tuple[Any, Any], x: Any, y: Any, size: int, evaluate: Evaluate, about: int = 0
+) -> None:
+    """Ask for M at the nodes of cells, and at as many about them, that are not there yet.
+
+    Neighbours go together: they are quicker so.
+    """
+    asked = dr.zeros(mi.Bool, len(nodes.there))
+    across, down = grid.steps(size)
+    first = grid.node(x, y, size, 0, 0) - about * (across + down)
+    for n in range(3 + 2 * about):
+        for m in range(3 + 2 * about):
+            dr.scatter(asked, mi.Bool(True), first + (n * down + m * across))
     asked &= ~nodes.there
     left: Any = dr.compress(dr.gather(mi.Bool, asked, order[0], order[1]))
     index = dr.gather(mi.UInt32, order[0], left)
@@ -288,7 +309,9 @@ def _fill(nodes: _Nodes, grid: _Grid, order: tuple[Any, Any], x: Any, y: Any, si
     dr.eval(nodes.values, nodes.error, nodes.shape, nodes.there)
 
 
-def _judged(nodes: _Nodes, grid: _Grid, x: Any, y: Any, size: int, finest: int, shares: Shares) -> _Verdict:
+def _judged(
+    nodes: _Nodes, grid: _Grid, x: Any, y: Any, size: int, finest: int, shares: Shares, pixel_rows: int
+) -> _Verdict:
     """What the nodes of cells at (x, y) tell of them."""
     own = _gathered(nodes, grid, x, y, size)
     index = [grid.node(x, y, size, m, n) for n in range(3) for m in range(3)]
@@ -310,15 +333,20 @@ def _judged(nodes: _Nodes, grid: _Grid, x: Any, y: Any, size: int, finest: int, 
     missed, rays = dr.opaque(mi.Float, shares.missed), dr.opaque(mi.Float, shares.rays)
     allowed = dr.opaque(mi.Float, shares.most)
     ray, mixed = mi.UInt32(0), mi.Float(dr.inf)
-    apart = (clear > size) | (size == finest)
+    resolved = (clear > size) | (size == finest)
     serves = same & (off <= allowed)
     if size == 1:
         serves &= (left_of_mean <= OF_PIXEL * missed) & (left <= IN_PIXEL * missed)
     else:
-        serves &= (left <= missed) & (apart | (least > WIDE))
+        serves &= (left <= missed) & (resolved | (least > WIDE))
+    cubic, off_cubic = _by_cubics(nodes, grid, x, y, size, light, shares, pixel_rows)
+    cubic &= ~serves & (resolved | (least > WIDE))
+    serves |= cubic
+    off = dr.select(cubic, off_cubic, off)
     if size == LARGEST:
-        ray = dr.select(same & apart & (most <= rays), dr.select(own[0].x > 0.5, mi.UInt32(2), 1), 0)
+        ray = dr.select(same & resolved & (most <= rays), dr.select(own[0].x > 0.5, mi.UInt32(2), 1), 0)
         serves |= ray > 0
+        cubic &= ray == 0
         off = dr.select(ray > 0, most, off)
     within = (IN_PIXEL if finest == 1 else 1) * missed
     if size == finest:
@@ -327,7 +355,7 @@ def _judged(nodes: _Nodes, grid: _Grid, x: Any, y: Any, size: int, finest: int, 
         mixed = dr.select(~same & alike, error + spread, dr.inf)
     hopeless = same & (left * AT_BEST ** math.log2(size / finest) > within)  # not where M is NaN
     halved = ~serves & ~hopeless
-    verdict = _Verdict(serves, error + off, ray, mixed, halved)
+    verdict = _Verdict(serves, error + off, ray, cubic, mixed, halved)
     dr.eval(*verdict)
     return verdict
 
@@ -340,9 +368,10 @@ def _witnessed(
     if len(some) == 0:
         return found
     x, y, ray = (dr.gather(mi.UInt32, values, some) for values in (x, y, found.ray))
+    cubic = dr.gather(mi.Bool, found.cubic, some)
     u, v = WITNESS
     there = evaluate(mi.Float(x) + size * u, grid.top + mi.Float(y) + size * v)
-    told = _sum(_gathered(nodes, grid, x, y, size), _quadratic(mi.Float(u)), _quadratic(mi.Float(v)))
+    told, _ = _told(nodes.values, grid, x, y, size, cubic, mi.Float(u), mi.Float(v), mi.Bool(True))
     real, imag = _or_ray(told, ray)
     off = dr.sqrt(dr.square(real - mi.Float(there.real)) + dr.square(imag - mi.Float(there.imag)))
     light = dr.minimum(dr.sqrt(dr.square(real) + dr.square(imag)), 1) + dr.opaque(mi.Float, shares.beside)
@@ -449,6 +478,7 @@ def _level(size: int, x: Any, y: Any, across: int, down: int, found: _Verdict) -
         dr.zeros(mi.Bool, count),
         dr.zeros(mi.Float, count),
         dr.zeros(mi.UInt32, count),
+        dr.zeros(mi.Bool, count),
         dr.full(mi.Float, dr.inf, count),
     )
     for values, of_cells in zip(level[1:], found, strict=False):
@@ -463,46 +493,57 @@ def _quarters(x: Any, y: Any, size: int) -> tuple[Any, Any]:
     return dr.gather(mi.UInt32, x, of) + (part & 1) * size, dr.gather(mi.UInt32, y, of) + ((part >> 1) & 1) * size
 
 
-def _by_pixel(nodes: _Nodes, grid: _Grid, levels: list[_Level], pixels: int, rows: int, shares: Shares) -> Cells:
+def _by_pixel(nodes: _Nodes, grid: _Grid, levels: list[_Level], pixels: int, rows: int) -> Cells:
     """Each pixel's cell."""
     index = dr.arange(mi.UInt32, pixels * rows)
     y = index // grid.pixels
     x = index - y * grid.pixels
-    size, error, ray, mixed = mi.UInt32(0), mi.Float(0), mi.UInt32(0), mi.Float(dr.inf)
+    size, error, ray, cubic, mixed = mi.UInt32(0), mi.Float(0), mi.UInt32(0), mi.Bool(False), mi.Float(dr.inf)
     for level in levels:
         place = (y // level.size) * (grid.pixels // level.size) + x // level.size
         serves = dr.gather(mi.Bool, level.serves, place)
         size = dr.select(serves, level.size, size)
         error = dr.select(serves, dr.gather(mi.Float, level.error, place), error)
         ray = dr.select(serves, dr.gather(mi.UInt32, level.ray, place), ray)
+        cubic |= dr.gather(mi.Bool, level.cubic, place, serves)
         mixed = dr.minimum(mixed, dr.gather(mi.Float, level.mixed, place))
     first = grid.node(x & ~(size - 1), y & ~(size - 1), size, 0, 0)
     shape = dr.gather(mi.UInt32, nodes.shape, first, size > 0)
-    dr.eval(size, error, ray, mixed, shape)
-    by_cubics = dr.full(mi.Float, dr.inf, pixels * rows)
-    left: Any = dr.compress((size == 0) & ~dr.isfinite(mixed))
-    if len(left):
-        at = dr.gather(mi.UInt32, x, left), dr.gather(mi.UInt32, y, left)
-        dr.scatter(by_cubics, _cubics(nodes, grid, *at, pixels, rows, shares), left)
-    unknown: Any = dr.count((size == 0) & ~dr.isfinite(mixed) & ~dr.isfinite(by_cubics))
-    return Cells(grid, nodes.values, nodes.shape, size, shape, error, ray, mixed, by_cubics, int(unknown[0]))
+    unknown: Any = dr.count((size == 0) & ~dr.isfinite(mixed))
+    dr.eval(size, error, ray, cubic, mixed, shape, unknown)
+    return Cells(grid, nodes.values, nodes.shape, size, shape, error, ray, cubic, mixed, int(unknown[0]))
 
 
-def _cubics(nodes: _Nodes, grid: _Grid, x: Any, y: Any, pixels: int, rows: int, shares: Shares) -> Any:
-    """M's error in pixels by cubics, infinite where these do not serve."""
-    size = 1 << grid.shift
-    x, y = x & ~mi.UInt32(size - 1), y & ~mi.UInt32(size - 1)
-    inside = (x > 0) & (y > 0) & (x + size < pixels) & (y + size < rows)
-    apart = doubt(nodes.values, nodes.shape, grid.before(x, y), grid.columns, inside)
-    error, light = mi.Float(0), mi.Float(0)
-    for n in range(3):
-        for m in range(3):
-            node = grid.node(x, y, size, m, n)
-            M = dr.gather(mi.Array4f, nodes.values, node)
-            error = dr.maximum(error, dr.gather(mi.Float, nodes.error, node))
-            light = dr.maximum(light, dr.fma(M.x, M.x, M.y * M.y))
-    light = dr.minimum(dr.sqrt(light), 1) + dr.opaque(mi.Float, shares.beside)
-    serves = (apart <= dr.opaque(mi.Float, shares.most)) & (
-        apart * (light + apart) <= BY_CUBICS * dr.opaque(mi.Float, shares.missed)
-    )
-    return dr.select(serves, error + apart, dr.inf)
+def _by_cubics(
+    nodes: _Nodes, grid: _Grid, x: Any, y: Any, size: int, light: Any, shares: Shares, rows: int
+) -> tuple[Any, Any]:
+    """Whether cubics serve cells, and what they may leave of M there."""
+    across, down = grid.steps(size)
+    first = grid.node(x, y, size, 0, 0) - (across + down)
+    off = apart(nodes.values, nodes.shape, first, (across, down), _inside(grid, x, y, size, rows))
+    missed, allowed = dr.opaque(mi.Float, shares.missed), dr.opaque(mi.Float, shares.most)
+    return (off <= allowed) & (off * (light + off) <= BY_CUBICS[size > 1] * missed), off
+
+
+def _told(values: Any, grid: _Grid, x: Any, y: Any, size: Any, cubic: Any, u: Any, v: Any, active: Any) -> Any:
+    """What nodes say at places (u, v), 0..1, of cells at pixels (x, y), and the range of their distances."""
+    steps = grid.steps(size)
+    first = grid.node(x, y, size, 0, 0)
+    ways = []
+    for t, step in zip((u, v), steps, strict=True):
+        second, of_cubic = weights(t)
+        first = first - dr.select(cubic & ~second, step, 0)
+        own = (*_quadratic(t), mi.Float(0))
+        ways.append(
+            [
+                (dr.select(cubic, a, b), m * step if m < 3 else dr.select(cubic, 3 * step, 0))
+                for m, (a, b) in enumerate(zip(of_cubic, own, strict=True))
+            ]
+        )
+    found, low, high = mi.Array4f(0), mi.Float(dr.inf), mi.Float(0)
+    for b, down in ways[1]:
+        for a, across in ways[0]:
+            value = dr.gather(mi.Array4f, values, first + (down + across), active)
+            found = dr.fma(mi.Array4f(a * b), value, found)
+            low, high = dr.minimum(low, value.z), dr.maximum(high, value.z)
+    return found, high - low

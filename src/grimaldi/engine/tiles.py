@@ -164,7 +164,7 @@ class Samples(NamedTuple):
 
 
 def _at_samples(light: Light, ask: Ask, sensor: Any, shot: Shot, first: int, pixels: int, cells: Cells) -> Samples:
-    """M at the samples of the pixels that no cell serves: by nodes about them, or asked together."""
+    """M at the samples of the pixels that no cell serves: by nodes on the same shape, or asked together."""
     rank = dr.full(mi.UInt32, OUTSIDE, pixels)
     every = dr.opaque(mi.UInt32, first) + dr.arange(mi.UInt32, pixels)
     width = dr.opaque(mi.UInt32, shot.width)
@@ -178,7 +178,7 @@ def _at_samples(light: Light, ask: Ask, sensor: Any, shot: Shot, first: int, pix
     pixel = dr.opaque(mi.UInt32, first) + dr.gather(mi.UInt32, own, of)
     _, film = _sample(shot, pixel, index - of * dr.opaque(mi.UInt32, shot.spp))
     (_, receivers, shape), si = sight(light, sensor, shot, film.x, film.y)
-    found = cells.elsewhere(film.x, film.y, si.t, shape, receivers.active)
+    found = cells.beside(film.x, film.y, si.t, shape, receivers.active)
     values = [mi.Float64(v) for v in found[:3]]
     dr.eval(values, found.holds, film, *receivers)
     left: Any = dr.compress(receivers.active & ~found.holds)
