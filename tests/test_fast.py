@@ -23,7 +23,7 @@ from grimaldi.diffraction.reach import reach
 from grimaldi.diffraction.segment import Corners, Rule, line, segment_wave
 from grimaldi.engine.asking import ask
 from grimaldi.engine.blocks import Sight, Squares, squares
-from grimaldi.engine.cells import LARGEST, Nodes, Shares, cells
+from grimaldi.engine.cells import LARGEST, ROWS, Nodes, Shares, cells
 from grimaldi.engine.tiles import Shot, sight
 from grimaldi.light import Settings, prepare
 
@@ -256,9 +256,11 @@ def test_cells_far_too_coarse_for_the_fringes_are_not_halved():
 
 
 def test_a_part_of_the_film_has_the_cells_of_the_whole():
-    whole, part = cells(waves, 96, 0, 64, 2, only(5e-3)), cells(waves, 96, LARGEST, 32, 2, only(5e-3))
-    across = len(whole.size) // 64
-    np.testing.assert_array_equal(part.size.numpy(), whole.size.numpy()[LARGEST * across : 48 * across])
+    whole, part = cells(waves, 96, 0, 3 * ROWS, 2, only(5e-3)), cells(waves, 96, ROWS, ROWS, 2, only(5e-3))
+    own = slice(ROWS * 96, 2 * ROWS * 96)
+    np.testing.assert_array_equal(part.size.numpy(), whole.size.numpy()[own])
+    np.testing.assert_array_equal(part.cubic.numpy(), whole.cubic.numpy()[own])
+    assert part.cubic.numpy().any()
 
 
 def test_where_waves_are_faint_pictures_show_what_rays_find():

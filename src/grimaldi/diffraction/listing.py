@@ -159,18 +159,24 @@ def _pairs(search: Search, blocks: Blocks, n: int) -> _Pairs:
 def _finest(fr: Frame, k: Any, blocks: Blocks, block: Any, piece: Piece) -> Any:
     """Cycles a pixel of a piece's fringes with the direct light, along rows or columns, where a block has the widest.
 
-    ∇Δ at P is the direction X→P less that of S→P.
+    ∇Δ at P is the direction X→P less that of S→P. Where it changes sign between corners fringes are wide somewhere.
     """
     V, corners = type(piece.middle), LATTICE * LATTICE
-    right, down = (dr.gather(type(v), v, block) for v in (blocks.right, blocks.down))
-    least = type(piece.reach)(dr.inf)
     P = fr.foot + fr.z2 * fr.a - piece.middle
     middle = dr.gather(type(blocks.p), blocks.p, block)
+    slopes = []
     for i in (0, LATTICE - 1, corners // 2, corners - LATTICE, corners - 1):
         d = P + V(dr.gather(type(blocks.lattice), blocks.lattice, block * corners + i) - middle)
-        slope = d / dr.norm(d) - fr.a
-        least = dr.minimum(least, dr.maximum(dr.abs(dr.dot(V(right), slope)), dr.abs(dr.dot(V(down), slope))))
-    return least * k / (2 * np.pi)
+        slopes.append(d / dr.norm(d) - fr.a)
+    finest = type(piece.reach)(0)
+    for side in (blocks.right, blocks.down):
+        along = V(dr.gather(type(side), side, block))
+        cycles = [dr.dot(along, slope) for slope in slopes]
+        low, high = cycles[0], cycles[0]
+        for c in cycles:
+            low, high = dr.minimum(low, c), dr.maximum(high, c)
+        finest = dr.maximum(finest, dr.maximum(low, -high))
+    return finest * k / (2 * np.pi)
 
 
 def _beside(search: Search, blocks: Blocks) -> Near | None:

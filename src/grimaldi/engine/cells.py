@@ -25,6 +25,7 @@ from grimaldi.engine.cubics import apart, weights
 mi: Any = mitsuba  # the stubs refuse numbers where arrays are asked for
 
 LARGEST = 16  # pixels across the largest cells
+ROWS = 64  # of pixels, over whose borders no cubic goes, so that parts of a film begin at them
 HALVED = 0.25  # what halving a cell leaves of a quadratic's error, at most
 AT_BEST = 1 / 16  # what it leaves of it at best: an eighth of a cubic's, less in quarters where M is straighter
 STRAIGHT = 0.5  # what a quadratic leaves of a bilinear function's error, at most
@@ -211,7 +212,7 @@ class _Verdict(NamedTuple):
 
 
 def cells(evaluate: Evaluate, width: int, top: int, rows: int, finest: int, shares: Shares) -> Cells:
-    """The cells of `rows` rows of a film `width` pixels wide, from row `top` on, which `LARGEST` divides.
+    """The cells of `rows` rows of a film `width` pixels wide, from row `top` on, which `ROWS` divides.
 
     Cells are `finest` pixels or more across, a power of two.
     """
@@ -276,8 +277,8 @@ def _with_nodes_about(
 
 
 def _inside(grid: _Grid, x: Any, y: Any, size: int, rows: int) -> Any:
-    """Whether there are nodes on all sides of cells."""
-    return (x > 0) & (y > 0) & (x + size < grid.pixels) & (y + size < rows)
+    """Whether there are nodes on all sides of cells that cubics may take."""
+    return (x > 0) & (y % ROWS > 0) & (x + size < grid.pixels) & ((y + size) % ROWS > 0) & (y + size < rows)
 
 
 def _fill(

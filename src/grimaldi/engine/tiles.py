@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from grimaldi.diffraction.model import OUTSIDE, Factor, Grouped, Receivers
 from grimaldi.engine.asking import Ask, ask
 from grimaldi.engine.blocks import Sight, squares
-from grimaldi.engine.cells import LARGEST, Cells, Known, Nodes, cells
+from grimaldi.engine.cells import LARGEST, ROWS, Cells, Known, Nodes, cells
 from grimaldi.light import Light, Reflected
 from grimaldi.tracing import trace
 
@@ -89,9 +89,9 @@ def bands(light: Light, sensor: Any, shot: Shot) -> Iterator[Band]:
         yield Band(0, shot.height, (), ())
         return
     finest = 1 if shot.spp >= 8 else 2 if shot.spp >= 2 else 4  # a finer cell asks no less than its pixels would
-    row = len(light.beams) * LARGEST * shot.width * (2 / finest) ** 2 / NODES
+    row = len(light.beams) * ROWS * shot.width * (2 / finest) ** 2 / NODES
     items = max((beam.factor.items for beam in light.beams if isinstance(beam.factor, Grouped)), default=0)
-    step = LARGEST * max(int(1 / max(row, items * shot.width / (LARGEST * PAIRS))), 1)
+    step = ROWS * max(int(1 / max(row, items * shot.width * ROWS / (LARGEST**2 * PAIRS))), 1)
     for top in range(0, shot.height, step):
         rows = min(step, shot.height - top)
         film = squares(lambda x, y: sight(light, sensor, shot, x, y)[0], shot.width, top, rows)
