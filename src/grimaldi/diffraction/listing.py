@@ -92,7 +92,7 @@ def lists(search: Search, blocks: Blocks) -> Lists:
         changes |= dr.select(seen.open, dr.gather(mi.Bool, closed, other), dr.gather(mi.Bool, open_, other))
     limit = 2 * np.pi * tolerance
     faint = seen.far & (dr.maximum(dr.abs(seen.start), dr.abs(seen.stop)) < UNTESTED * limit)
-    tested = curved | (changes & ~faint) | seen.passes
+    tested = ((curved | changes) & ~faint) | seen.passes
     dropped = seen.open & ~tested & seen.far & (seen.inner2 < dr.square(CORNER * limit))
     kept = seen.open & ~tested & ~dropped
     dr.eval(tested, kept, dropped)
