@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -18,13 +20,14 @@ from grimaldi.diffraction.boundary import boundary
 from grimaldi.diffraction.corners import between, corner
 from grimaldi.diffraction.frame import Frame
 from grimaldi.diffraction.hierarchy import layout, least_detour
-from grimaldi.diffraction.model import Options, Receivers
+from grimaldi.diffraction.model import Factor, Options, Receivers
 from grimaldi.diffraction.reach import reach
 from grimaldi.diffraction.segment import Corners, Rule, line, segment_wave
 from grimaldi.engine.asking import ask
 from grimaldi.engine.blocks import Sight, Squares, squares
 from grimaldi.engine.cells import LARGEST, ROWS, Nodes, Shares, cells
-from grimaldi.engine.tiles import Shot, sight
+from grimaldi.engine.frozen import frozen
+from grimaldi.engine.tiles import Samples, Shot, sight
 from grimaldi.light import Settings, prepare
 
 mi: Any = mitsuba
@@ -203,6 +206,59 @@ def test_fringes_that_lists_leave_out_are_too_fine_for_pixels():
     assert of_means < 0.25 * at_points
 
 
+# ---------------------------------------------------------------- models recorded once
+
+
+def test_a_recorded_model_tells_what_the_model_tells_wherever_it_is_asked():
+    """For any number of receivers, and of another light with other arrays."""
+    for tolerance in (2e-2, 1e-3):
+        floor = Floor(tolerance, "graded")
+        model = floor.light.beams[0].factor
+        recorded = frozen(model)
+        for n in (300, 7, 1, 2000):
+            x, y = (mi.Float(v.astype(np.float32)) for v in np.random.default_rng(n).uniform(0, 64, (2, n)))
+            receivers = floor.sight(x, y).receivers
+            for own, plain in zip(recorded(receivers), model(receivers), strict=True):
+                np.testing.assert_allclose(own.numpy(), mi.Float64(plain).numpy(), rtol=0, atol=1e-6)
+
+
+def test_a_model_that_hides_an_array_is_refused_not_recorded():
+    """What is not found would stay as it was when its kernel was recorded."""
+    hidden = {"array": dr.opaque(mi.Float, 2.0)}  # a dict is not among what models are made of
+
+    def model(receivers: Receivers) -> Factor:
+        return Factor(hidden["array"] * mi.Float(receivers.p.x), mi.Float(0), mi.Float(0), mi.Float(0))
+
+    point = Receivers(mi.Point3d(1, 2, 3), mi.Vector3f(0, 0, 1), mi.Bool(True))
+    with pytest.raises(RuntimeError):
+        frozen(model)(point)
+
+
+GARBAGE = """
+import gc
+import numpy as np
+import grimaldi
+from grimaldi.diffraction.arrays import types
+from grimaldi.diffraction.boundary import _Bodies
+
+listed = _Bodies.listed
+def littering(self, *given):
+    for _ in range(300):
+        ring = [types(double=False).buffer(np.arange(1000.0))]
+        ring.append(ring)
+    return listed(self, *given)
+_Bodies.listed = littering
+gc.set_threshold(5)
+grimaldi.render("creature", wavelength=4.0, size=(16, 16), spp=8, tolerance=0.1)
+"""
+
+
+def test_what_python_collects_does_not_end_a_recording():
+    """Dr.Jit ends the process where NumPy's memory is given back while it records."""
+    done = subprocess.run([sys.executable, "-c", GARBAGE], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+
+
 # ---------------------------------------------------------------- cells of the film
 
 
@@ -261,6 +317,33 @@ def test_a_part_of_the_film_has_the_cells_of_the_whole():
     np.testing.assert_array_equal(part.size.numpy(), whole.size.numpy()[own])
     np.testing.assert_array_equal(part.cubic.numpy(), whole.cubic.numpy()[own])
     assert part.cubic.numpy().any()
+
+
+def test_cubics_go_through_what_is_cubic_and_say_how_far_quadratics_are_off():
+    """A lattice of nodes of M = x³ - y³ + i(x² y): cubics tell it exactly."""
+
+    def exact(x: Any, y: Any) -> tuple[Any, Any]:
+        return (x**3 - y**3) * 1e-2, x * x * y * 1e-2
+
+    def nodes(x: Any, y: Any) -> Nodes:
+        return on_one(*exact(x, y))
+
+    film = cells(nodes, 16, 0, 16, 1, only(2e-2))
+    sizes, by_cubics = film.size.numpy().reshape(16, 16), film.cubic.numpy().reshape(16, 16)
+    assert by_cubics.any()
+    assert not by_cubics[0].any()  # there is nothing above the first row
+    rng = np.random.default_rng(0)
+    x, y = mi.Float(rng.uniform(0, 16, 4000)), mi.Float(rng.uniform(0, 16, 4000))
+    known = film.at(x, y, 100 + 0 * x, mi.UInt32(1), mi.Bool(True))
+    real, imag = exact(x, y)
+    off = np.hypot((known.real - real).numpy(), (known.imag - imag).numpy())
+    pixel = y.numpy().astype(int), x.numpy().astype(int)
+    told = known.holds.numpy() & by_cubics[pixel]
+    assert off[told].max() < 1e-4  # of values up to 40, in Float32
+    # M's third difference along rows and columns is 6 s³, and a quadratic's largest error 0.064 times that
+    s = 0.5 * sizes[by_cubics].astype(float)
+    apart = film.error.numpy().reshape(16, 16)[by_cubics]
+    np.testing.assert_allclose(apart, 0.064 * np.sqrt(2) * 6e-2 * s**3, rtol=2e-2)
 
 
 def test_where_waves_are_faint_pictures_show_what_rays_find():
@@ -356,3 +439,18 @@ def test_a_picture_by_cells_is_that_by_samples(tolerance):
     assert abs(slow.U.values - rays.U.values).max() > 0.1 * size
     assert abs(fast.U.values - slow.U.values).max() < tolerance * size
     assert abs(fast.intensity.values - slow.intensity.values).max() < 3 * tolerance * size**2
+
+
+def test_samples_that_cells_do_not_tell_are_asked_for(monkeypatch):
+    """The model is no part of the kernel that shades; where that lacks M, it is asked after all."""
+    given = {"wavelength": 4.0, "size": (32, 32), "spp": 8, "tolerance": 1e-3}
+    usual = grimaldi.render("creature", **given)
+    at = Samples.at
+
+    def nowhere(*where: Any) -> Any:
+        return at(*where)._replace(holds=mi.Bool(False))
+
+    monkeypatch.setattr(Samples, "at", nowhere)
+    asked = grimaldi.render("creature", **given)
+    assert asked.attrs["non_finite"] == 0
+    assert abs(asked.U - usual.U).max() < given["tolerance"]
