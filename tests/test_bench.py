@@ -9,12 +9,13 @@ import sys
 from datetime import date
 from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 import grimaldi
-from grimaldi.bench import ROWS, bodies, chosen, error, killeroo, memory, pairs, planar, report, scenes
+from grimaldi.bench import ROWS, bodies, chosen, error, gpu, killeroo, memory, pairs, planar, report, scenes
 from grimaldi.bench.error import TOLERANCES, Film
 from grimaldi.bench.model import Result, Settings, Skipped, Target
 from grimaldi.bench.timing import beside, medians
@@ -94,6 +95,22 @@ def test_every_row_is_a_module_that_measures():
     assert chosen(["pairs", "killeroo"]) == ("killeroo", "pairs")
     with pytest.raises(InputError, match="did you mean 'memory'"):
         chosen(["memroy"])
+
+
+def test_the_peak_of_a_gpu_is_that_of_its_data_sheet():
+    """NVIDIA's own figures: H100 SXM5 67 TFLOP/s at 1980 MHz on 132 multiprocessors, A100 19.5 at 1410 MHz on 108."""
+
+    class Driver:
+        def __init__(self, **attributes: int) -> None:
+            self.attributes = attributes
+
+        def cuDeviceGetAttribute(self, into: Any, which: int, device: int) -> int:  # noqa: N802 (the driver's name)
+            name = {getattr(gpu, name): name for name in ("CLOCK", "MULTIPROCESSORS", "MAJOR", "MINOR")}[which]
+            into._obj.value = self.attributes[name]
+            return 0
+
+    assert gpu.peak(Driver(CLOCK=1_980_000, MULTIPROCESSORS=132, MAJOR=9, MINOR=0)) == pytest.approx(67e12, rel=0.01)
+    assert gpu.peak(Driver(CLOCK=1_410_000, MULTIPROCESSORS=108, MAJOR=8, MINOR=0)) == pytest.approx(19.5e12, rel=0.01)
 
 
 def test_a_row_without_its_data_says_so(tmp_path):

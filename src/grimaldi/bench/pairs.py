@@ -1,4 +1,7 @@
-"""Pairs of point and segment a second, beside a hand-written loop of AVX-512 over the same geometry: a diagnostic."""
+"""Pairs of point and segment a second, beside a hand-written loop of AVX-512 over the same geometry: a diagnostic.
+
+On a GPU, beside what it could do at most if a pair took no more than the operations of that loop.
+"""
 
 from __future__ import annotations
 
@@ -11,12 +14,15 @@ from pathlib import Path
 import numpy as np
 
 import grimaldi
+from grimaldi.bench import gpu
 from grimaldi.bench.error import field_error
 from grimaldi.bench.model import Result, Settings
 from grimaldi.bench.timing import medians, written
+from grimaldi.variants import on_cuda
 
 FLAGS = ("-O3", "-march=native", "-ffast-math", "-pthread")
 TOLERANCE = 1e-3
+OPERATIONS = 140  # of the hand-written loop for a pair, a root or a quotient counting as one
 
 
 def measure(settings: Settings) -> Result:
@@ -49,6 +55,10 @@ def rates(side: int, segments: int, settings: Settings) -> Result:
     else:
         lines[1] |= {"time": written(512**2 * segments / theirs), "pairs/s": f"{theirs:.3g}", "error": "not compared"}
         lines.append({"": "ratio", "pairs/s": f"{pairs / ours / theirs:.3g}"})
+    if on_cuda():
+        most = gpu.peak(gpu.driver()) / OPERATIONS
+        lines.append({"": f"GPU's peak, {OPERATIONS} operations a pair", "pairs/s": f"{most:.3g}"})
+        lines.append({"": "share of that", "pairs/s": f"{pairs / ours / most:.1%}"})
     text = (
         f"{side}² points behind a polygonal hole of {segments:,} sides, one point source, tolerance {TOLERANCE:g}, "
         "along the outlines (`fast=False`). A pair that is left out as too weak counts as one. The error is the "
