@@ -104,7 +104,7 @@ def test_the_peak_of_a_gpu_is_that_of_its_data_sheet():
         def __init__(self, **attributes: int) -> None:
             self.attributes = attributes
 
-        def cuDeviceGetAttribute(self, into: Any, which: int, device: int) -> int:  # noqa: N802 (the driver's name)
+        def cuDeviceGetAttribute(self, into: Any, which: int, device: int) -> int:
             name = {getattr(gpu, name): name for name in ("CLOCK", "MULTIPROCESSORS", "MAJOR", "MINOR")}[which]
             into._obj.value = self.attributes[name]
             return 0
