@@ -25,16 +25,16 @@ class View(NamedTuple):
 def seen(scene: Scene, sensor: Any) -> View:
     """What a sensor sees of a scene, on a coarse grid."""
     width = int(sensor.film().crop_size()[0])
-    x, y = dr.meshgrid(*(dr.arange(mi.Float, GRID) / GRID + 0.5 / GRID for _ in range(2)))
-
-    def hits(shift: float) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
-        ray, _ = sensor.sample_ray_differential(0.0, 0.5, mi.Point2f(x + shift / width, y), mi.Point2f(0.5))
-        si = scene.mitsuba.ray_intersect(ray)
-        n = dr.mulsign(mi.Vector3f(si.n), -dr.dot(si.n, ray.d))
-        return np.array(si.p, np.float64).T, np.array(n, np.float64).T, np.array(si.is_valid())
-
-    here, normals, met = hits(0.0)
-    beside, _, met_too = hits(1.0)
-    pixel = np.linalg.norm(here - beside, axis=1)
-    keep = met & met_too & (pixel > 0)
-    return View(here[keep], normals[keep], pixel[keep])
+    index = dr.arange(mi.UInt32, 2 * GRID**2)  # each place of the grid, then those a pixel beside: in one kernel
+    place, beside = index % GRID**2, index // GRID**2
+    x = (mi.Float(place % GRID) + 0.5) / GRID + mi.Float(beside) / width
+    y = (mi.Float(place // GRID) + 0.5) / GRID
+    ray, _ = sensor.sample_ray_differential(0.0, 0.5, mi.Point2f(x, y), mi.Point2f(0.5))
+    si = scene.mitsuba.ray_intersect(ray)
+    n = dr.mulsign(mi.Vector3f(si.n), -dr.dot(si.n, ray.d))
+    met = si.is_valid()
+    dr.eval(si.p, n, met)
+    points, normals = (np.array(v, np.float64).T.reshape(2, -1, 3) for v in (si.p, n))
+    pixel = np.linalg.norm(points[0] - points[1], axis=1)
+    keep = np.array(met).reshape(2, -1).all(axis=0) & (pixel > 0)
+    return View(points[0][keep], normals[0][keep], pixel[keep])

@@ -17,6 +17,8 @@ from grimaldi.variants import on_cuda
 
 mi: Any = mitsuba  # the stubs refuse numbers where arrays are asked for
 
+SHAPES = 2000  # in all scenes that a model holds: Dr.Jit looks at each of more for longer than Python takes to trace
+
 
 def frozen(evaluate: Evaluate) -> Evaluate:
     """The same model, evaluated at receivers: Float64 arrays."""
@@ -25,7 +27,8 @@ def frozen(evaluate: Evaluate) -> Evaluate:
         return tuple(mi.Float64(v) for v in evaluate(Receivers(*receivers)))
 
     state = held(evaluate)
-    replayed = asked if on_cuda() else dr.freeze(asked, state_fn=lambda *_: state)
+    shapes = sum(len(part.shapes()) for part in state if isinstance(part, mi.Scene))
+    replayed = asked if on_cuda() or shapes > SHAPES else dr.freeze(asked, state_fn=lambda *_: state)
 
     def evaluated(receivers: Receivers) -> Factor:
         dr.make_opaque(*receivers)  # a literal would need a recording of its own
