@@ -47,7 +47,7 @@ mi: Any = mitsuba  # the stubs refuse numbers where arrays are asked for
 
 AS_ONE = 4.0  # rad at a tolerance of 1: half of what a run of pieces subtends that is tested by one ray X→P
 LOOSE = 5e-3  # tolerance from which on blocks have lists: thin shadows that they miss are steps in M of some percent
-BESIDE = 1e-2  # share of the way to a corner, up to which rounding beside it is like anywhere
+BESIDE = 1e-2  # what rounding shifts an edge by over the way to it, up to which a corner there makes no difference
 UNASKED = 0.3  # of the tolerance: what all pieces whose X→P goes untested may add to M, each the same
 
 

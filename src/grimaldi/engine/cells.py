@@ -1,4 +1,5 @@
-"""M over a picture: at the corners, sides and middles of cells of the film, and between them by quadratics.
+"""M over a picture: at the corners, sides and middles of cells of the film, and between them by quadratics,
+or by cubics where these do not serve (`cubics`).
 
 M = U/U0 is far smoother than U: what a pinhole camera sees of it takes a node every few pixels, fewer where it
 changes slowly. Cells are halved until what a cell's own nodes say differs by little from what the cell around them
