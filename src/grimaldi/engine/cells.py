@@ -1,6 +1,6 @@
-"""M over a picture: at the corners, sides and middles of cells of the film, and between them by quadratics,
-or by cubics where these do not serve (`cubics`).
+"""M over a picture: at nodes of cells of the film, and between them by quadratics, or cubics where these do not serve.
 
+Nodes are a cell's corners and the middles of its sides and of itself.
 M = U/U0 is far smoother than U: what a pinhole camera sees of it takes a node every few pixels, fewer where it
 changes slowly. Cells are halved until what a cell's own nodes say differs by little from what the cell around them
 predicted (Runge's comparison: a quadratic through nodes twice as near errs by an eighth), and where an outline's
