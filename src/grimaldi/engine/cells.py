@@ -142,9 +142,10 @@ class Cells:
 
 
 class _Grid(NamedTuple):
-    """Where nodes lie: every half of the finest cell's 2^shift pixels, `columns` in a row; `pixels` in a row."""
+    """Nodes at every half of the finest cell's 2^shift pixels, `columns` in a row, over `rows` rows of `pixels`."""
 
     pixels: Any
+    rows: Any
     columns: Any
     shift: int
     top: Any
@@ -170,6 +171,11 @@ class _Grid(NamedTuple):
     def node(self, x: Any, y: Any, size: Any, m: int, n: int) -> Any:
         """The index of node (m, n) of 3 × 3 in the cell at pixel (x, y)."""
         return ((2 * y + n * size) >> self.shift) * self.columns + ((2 * x + m * size) >> self.shift)
+
+    def inside(self, x: Any, y: Any, size: int) -> Any:
+        """Whether there are nodes on all sides of cells that cubics may take."""
+        before, after = (x > 0) & (y % ROWS > 0), (x + size < self.pixels) & (y + size < self.rows)
+        return before & after & ((y + size) % ROWS > 0)
 
     def steps(self, size: Any) -> tuple[Any, Any]:
         """From node to node of a cell, along rows and columns."""
@@ -221,6 +227,7 @@ def cells(evaluate: Evaluate, width: int, top: int, rows: int, finest: int, shar
     columns = 2 * across * LARGEST // finest + 1
     grid = _Grid(
         dr.opaque(mi.UInt32, across * LARGEST),
+        dr.opaque(mi.UInt32, down * LARGEST),
         dr.opaque(mi.UInt32, columns),
         finest.bit_length() - 1,
         dr.opaque(mi.Float, top),
@@ -234,9 +241,9 @@ def cells(evaluate: Evaluate, width: int, top: int, rows: int, finest: int, shar
     size = LARGEST
     while True:
         _fill(nodes, grid, order, x, y, size, evaluate)
-        found = _judged(nodes, grid, x, y, size, finest, shares, down * LARGEST)
+        found = _judged(nodes, grid, x, y, size, finest, shares)
         if size == finest:
-            found = _with_nodes_about(found, nodes, grid, order, x, y, size, evaluate, shares, down * LARGEST)
+            found = _with_nodes_about(found, nodes, grid, order, x, y, size, evaluate, shares)
         if size > 1:
             found = _witnessed(found, nodes, grid, x, y, size, evaluate, shares)
         levels.append(_level(size, x, y, across * LARGEST // size, down * LARGEST // size, found))
@@ -258,28 +265,19 @@ def _with_nodes_about(
     size: int,
     evaluate: Evaluate,
     shares: Shares,
-    rows: int,
 ) -> _Verdict:
     """The verdict on the finest cells again, those that do not serve with all nodes that cubics take."""
     shape = dr.gather(mi.UInt32, nodes.shape, grid.node(x, y, size, 0, 0))
-    same = shape > 0
-    for n in range(3):
-        for m in range(3):
-            same &= dr.gather(mi.UInt32, nodes.shape, grid.node(x, y, size, m, n)) == shape
-    some: Any = dr.compress(~found.serves & same & _inside(grid, x, y, size, rows))
+    same = (shape > 0) & _all_on(nodes, grid, x, y, size, shape)
+    some: Any = dr.compress(~found.serves & same & grid.inside(x, y, size))
     if len(some) == 0:
         return found
     x, y = dr.gather(mi.UInt32, x, some), dr.gather(mi.UInt32, y, some)
     _fill(nodes, grid, order, x, y, size, evaluate, about=1)
-    for values, again in zip(found, _judged(nodes, grid, x, y, size, size, shares, rows), strict=True):
+    for values, again in zip(found, _judged(nodes, grid, x, y, size, size, shares), strict=True):
         dr.scatter(values, again, some)
     dr.eval(*found)
     return found
-
-
-def _inside(grid: _Grid, x: Any, y: Any, size: int, rows: int) -> Any:
-    """Whether there are nodes on all sides of cells that cubics may take."""
-    return (x > 0) & (y % ROWS > 0) & (x + size < grid.pixels) & ((y + size) % ROWS > 0) & (y + size < rows)
 
 
 def _fill(
@@ -311,9 +309,7 @@ def _fill(
     dr.eval(nodes.values, nodes.error, nodes.shape, nodes.there)
 
 
-def _judged(
-    nodes: _Nodes, grid: _Grid, x: Any, y: Any, size: int, finest: int, shares: Shares, pixel_rows: int
-) -> _Verdict:
+def _judged(nodes: _Nodes, grid: _Grid, x: Any, y: Any, size: int, finest: int, shares: Shares) -> _Verdict:
     """What the nodes of cells at (x, y) tell of them."""
     own = _gathered(nodes, grid, x, y, size)
     index = [grid.node(x, y, size, m, n) for n in range(3) for m in range(3)]
@@ -341,7 +337,7 @@ def _judged(
         serves &= (left_of_mean <= OF_PIXEL * missed) & (left <= IN_PIXEL * missed)
     else:
         serves &= (left <= missed) & (resolved | (least > WIDE))
-    cubic, off_cubic = _by_cubics(nodes, grid, x, y, size, light, shares, pixel_rows)
+    cubic, off_cubic = _by_cubics(nodes, grid, x, y, size, light, shares)
     cubic &= ~serves & (resolved | (least > WIDE))
     serves |= cubic
     off = dr.select(cubic, off_cubic, off)
@@ -410,9 +406,7 @@ def _missed(
         return off, mean
     around = x & ~mi.UInt32(2 * size - 1), y & ~mi.UInt32(2 * size - 1)
     coarse = _gathered(nodes, grid, *around, 2 * size)
-    predicted = same
-    for i in (grid.node(*around, 2 * size, m, n) for n in range(3) for m in range(3)):
-        predicted &= dr.gather(mi.UInt32, nodes.shape, i) == shape
+    predicted = same & _all_on(nodes, grid, *around, 2 * size, shape)
     a, b = (mi.Float(c - c0) / (2 * size) for c, c0 in zip((x, y), around, strict=True))
     columns = [_quadratic(a + 0.25 * m) for m in range(3)]
     rows = [_quadratic(b + 0.25 * n) for n in range(3)]
@@ -437,6 +431,15 @@ def _spread(own: list[Any], shapes: list[Any]) -> Any:
 def _gathered(nodes: _Nodes, grid: _Grid, x: Any, y: Any, size: int) -> list[Any]:
     """The values of cells' nodes, row by row."""
     return [dr.gather(mi.Array4f, nodes.values, grid.node(x, y, size, m, n)) for n in range(3) for m in range(3)]
+
+
+def _all_on(nodes: _Nodes, grid: _Grid, x: Any, y: Any, size: int, shape: Any) -> Any:
+    """Whether all nodes of cells lie on a shape."""
+    same = mi.Bool(True)
+    for n in range(3):
+        for m in range(3):
+            same &= dr.gather(mi.UInt32, nodes.shape, grid.node(x, y, size, m, n)) == shape
+    return same
 
 
 def _length(d: Any) -> Any:
@@ -516,13 +519,11 @@ def _by_pixel(nodes: _Nodes, grid: _Grid, levels: list[_Level], pixels: int, row
     return Cells(grid, nodes.values, nodes.shape, size, shape, error, ray, cubic, mixed, int(unknown[0]))
 
 
-def _by_cubics(
-    nodes: _Nodes, grid: _Grid, x: Any, y: Any, size: int, light: Any, shares: Shares, rows: int
-) -> tuple[Any, Any]:
+def _by_cubics(nodes: _Nodes, grid: _Grid, x: Any, y: Any, size: int, light: Any, shares: Shares) -> tuple[Any, Any]:
     """Whether cubics serve cells, and what they may leave of M there."""
     across, down = grid.steps(size)
     first = grid.node(x, y, size, 0, 0) - (across + down)
-    off = apart(nodes.values, nodes.shape, first, (across, down), _inside(grid, x, y, size, rows))
+    off = apart(nodes.values, nodes.shape, first, (across, down), grid.inside(x, y, size))
     missed, allowed = dr.opaque(mi.Float, shares.missed), dr.opaque(mi.Float, shares.most)
     return (off <= allowed) & (off * (light + off) <= BY_CUBICS[size > 1] * missed), off
 
