@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from grimaldi.diffraction.arrays import on_device, types
 from grimaldi.scene.bodies import indices, vertices
-from grimaldi.scene.model import Cylinder, Disk, Mesh, Scene, Sphere
+from grimaldi.scene.model import Cylinder, Disk, Joined, Mesh, Scene, Sphere
 from grimaldi.scene.triangles import areas
 
 Reals = NDArray[np.float64]
@@ -29,6 +29,20 @@ class Hits(NamedTuple):
     count: Any
     planes: Any  # n, h
     quadrics: Any  # rows of A, b
+    parts: Any  # numbers of the parts of joined meshes, one for each of its planes; None where there are none
+
+    def surface(self, si: Any, active: Any) -> Any:
+        """A number above 0 for each surface, the parts of joined meshes among them, that interactions lie on; else 0.
+
+        It tells which are the same.
+        """
+        index: Any = dr.reinterpret_array(mi.UInt32, si.shape)
+        if self.parts is None:
+            return dr.select(active, index, 0)
+        known = active & (index < self.count)
+        shape = dr.gather(types(double=True).Packet, self.shapes, index, known)
+        part = dr.gather(mi.UInt32, self.parts, mi.UInt32(shape.y) + si.prim_index, known & (shape.x == FLAT))
+        return dr.select(active, dr.select(part > 0, part, index), 0)
 
     def point(self, ray: Any, si: Any, active: Any) -> Any:
         """The point (`mi.Point3d`) where a ray meets the surface that Mitsuba's interaction names.
@@ -67,6 +81,7 @@ def hits(scene: Scene) -> Hits:
     index = indices(scene.mitsuba)
     shapes = np.zeros((int(index.max(initial=0)) + 1, 4))
     planes, quadrics = [np.zeros((1, 4))], [np.zeros((1, 3, 4))]  # the device cannot gather from nothing
+    parts, count = [np.zeros(1)], len(shapes)
     flat = 1
     for i, surface in zip(index, scene.surfaces, strict=True):
         if surface is None:
@@ -76,6 +91,12 @@ def hits(scene: Scene) -> Hits:
             shapes[i] = FLAT, flat, isinstance(surface, Mesh), reach
             planes.append(_planes(surface))
             flat += len(planes[-1])
+            if isinstance(surface, Joined):
+                of_each = np.diff(surface.begin)
+                parts.append(count + np.repeat(np.arange(len(of_each)), of_each))
+                count += len(of_each)
+            else:
+                parts.append(np.zeros(len(planes[-1])))
         else:
             shapes[i] = CURVED, len(quadrics), 0, reach
             quadrics.append(_quadric(surface))
@@ -85,6 +106,7 @@ def hits(scene: Scene) -> Hits:
         on_device(mi.UInt32, len(shapes)),
         buffer(np.concatenate(planes)),
         buffer(np.concatenate(quadrics)),
+        mi.UInt32(np.concatenate(parts).astype(np.uint32)) if count > len(shapes) else None,
     )
 
 

@@ -120,7 +120,7 @@ def sight(light: Light, sensor: Any, shot: Shot, x: Any, y: Any) -> tuple[Sight,
     si = light.scene.mitsuba.ray_intersect(ray)
     lit = si.is_valid() & mi.has_flag(si.bsdf(ray).flags(), mi.BSDFFlags.Smooth)
     n = mi.Vector3f(dr.mulsign(si.n, -dr.dot(si.n, ray.d)))
-    shape = dr.select(lit, dr.reinterpret_array(mi.UInt32, si.shape), 0)
+    shape = light.hits.surface(si, lit)
     return Sight(ray, Receivers(light.hits.point(ray, si, lit), n, lit), shape), si
 
 
@@ -248,8 +248,7 @@ def _traced(
     def reflected(ray: Any, si: Any, bsdf: Any, n: Any, active: Any, first: Any) -> Reflected:
         known = []
         for m, samples in zip(cells, single, strict=True):
-            shape: Any = dr.reinterpret_array(mi.UInt32, si.shape)
-            found = m.at(film.x, film.y, si.t, shape, active & first)
+            found = m.at(film.x, film.y, si.t, light.hits.surface(si, active & first), active & first)
             own = samples.at(pixel, index, shot.spp, active & first)
             holds = found.holds | own.holds
             values = (dr.select(own.holds, a, b) for a, b in zip(own[:3], found[:3], strict=True))

@@ -11,12 +11,13 @@ from numpy.typing import NDArray
 
 from grimaldi.errors import InputError
 from grimaldi.scene.facets import facets
-from grimaldi.scene.model import Body, Cylinder, Disk, Geometry, Mesh, Sphere
+from grimaldi.scene.model import Body, Cylinder, Disk, Geometry, Joined, Mesh, Sphere
 from grimaldi.scene.planar import PlanarOutline
 from grimaldi.scene.triangles import as_mesh
 
 Reals = NDArray[np.float64]
 
+MANY = 256  # meshes, that it pays to put into one for: Dr.Jit looks at every shape there is wherever rays are traced
 FACES_ROUND = 4096  # of a cylinder: they lie 3e-7 radii inside it
 FLAT = 1e-6  # thickness over extent below which vertices lie in one plane: a few roundings of Float32
 
@@ -80,7 +81,7 @@ def blockers(mi_scene: Any, bodies: Iterable[Body]) -> Any:
     Only what has a null BSDF or part (apertures, masks, media) is left out. Embree's robust mode finds rays that
     meet an edge exactly, as those along an outline do. Of cylinders it holds the faces: Mitsuba's own intersection
     solves a quadratic in Float32, which from 150 radii away misses a cylinder's wall by a twentieth of its radius.
-    Of `bodies` that have facets it holds these.
+    Of `bodies` that have facets it holds these, and many meshes as one.
     """
     shapes = list(mi_scene.shapes())
     for body in bodies:
@@ -89,7 +90,26 @@ def blockers(mi_scene: Any, bodies: Iterable[Body]) -> Any:
     opaque = [shape for shape in shapes if not _lets_through(shape)]
     if not opaque:
         return None
-    return _sharing([_faces(shape) for shape in opaque], embree_use_robust_intersections=True)
+    return _sharing(_few([_faces(shape) for shape in opaque]), embree_use_robust_intersections=True)
+
+
+def _few(shapes: Sequence[Any]) -> list[Any]:
+    """Shapes for rays alone, more than `MANY` meshes as one."""
+    meshes = [shape for shape in shapes if shape.is_mesh() and not shape.is_ellipsoids()]
+    if len(meshes) <= MANY:
+        return list(shapes)
+    others = [shape for shape in shapes if not shape.is_mesh() or shape.is_ellipsoids()]
+    return [*others, _as_shape(meshes[0], one_of([_mesh(shape) for shape in meshes]))]
+
+
+def one_of(meshes: Sequence[Mesh]) -> Joined:
+    """Meshes one after the other."""
+    first = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
+    return Joined(
+        np.concatenate([mesh.vertices for mesh in meshes]),
+        np.concatenate([mesh.faces + i for mesh, i in zip(meshes, first[:-1], strict=True)]),
+        np.cumsum([0, *(len(mesh.faces) for mesh in meshes)]),
+    )
 
 
 def with_shapes(mi_scene: Any, shapes: Sequence[Any]) -> Any:

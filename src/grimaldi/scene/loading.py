@@ -14,8 +14,9 @@ from grimaldi.errors import GrimaldiWarning, InputError
 from grimaldi.scene.bodies import blockers, sort_shapes
 from grimaldi.scene.checking import check_nodes, check_scene
 from grimaldi.scene.instances import write_out
+from grimaldi.scene.joined import joined
 from grimaldi.scene.messages import one_line
-from grimaldi.scene.model import Scene
+from grimaldi.scene.model import Joined, Scene
 from grimaldi.scene.planar import PlanarOutline
 from grimaldi.scene.smooth import check_levels, smooth_meshes
 from grimaldi.scene.sources import sources
@@ -70,7 +71,7 @@ def load(
     with _in_scene(loaded.name):
         loaded = _smoothed(loaded, smooth)
         check_scene(loaded)
-    return loaded
+    return joined(loaded) if isinstance(scene, (str, Path, Mapping)) else loaded  # all shapes of others stay in use
 
 
 def _smoothed(scene: Scene, levels: int) -> Scene:
@@ -78,8 +79,19 @@ def _smoothed(scene: Scene, levels: int) -> Scene:
     finer = smooth_meshes(scene.mitsuba, levels)
     if finer is scene.mitsuba:
         return scene
-    bodies = sort_shapes(finer.shapes()).bodies
-    return replace(scene, mitsuba=finer, blockers=blockers(finer, bodies), bodies=bodies, smooth=scene.smooth + levels)
+    found = sort_shapes(finer.shapes())
+    new = {body.shape: body for body in found.bodies}
+    same = [isinstance(surface, Joined) for surface in scene.surfaces]  # they have no normals that they could bend by
+    bodies = tuple(body if same[body.shape] else new[body.shape] for body in scene.bodies)
+    surfaces = tuple(old if kept else s for old, kept, s in zip(scene.surfaces, same, found.surfaces, strict=True))
+    return replace(
+        scene,
+        mitsuba=finer,
+        blockers=blockers(finer, bodies),
+        surfaces=surfaces,
+        bodies=bodies,
+        smooth=scene.smooth + levels,
+    )
 
 
 def _outlines(outlines: Iterable[PlanarOutline]) -> tuple[PlanarOutline, ...]:

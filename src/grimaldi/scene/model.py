@@ -69,6 +69,13 @@ class Facets(Mesh):
 
 
 @dataclass(frozen=True, eq=False)
+class Joined(Mesh):
+    """Meshes one after the other; begin (n + 1,): where the faces of each begin, and how many there are."""
+
+    begin: NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
 class Sphere:
     centre: Vector
     radius: float
@@ -95,7 +102,7 @@ Geometry = Mesh | Sphere | Disk | Cylinder
 class Body:
     """An opaque shape that casts outlines.
 
-    `shape` is its index in `mi.Scene.shapes()`; `facets` stands for the geometry of a mesh that has much more triangles
+    `shape` is the index in `mi.Scene.shapes()` of what shows it, alone or joined to others; `facets` stands for the geometry of a mesh that has much more triangles
     than its plane parts need.
     """
 
