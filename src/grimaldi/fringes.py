@@ -16,7 +16,7 @@ from grimaldi.scene.bodies import vertices
 from grimaldi.scene.model import Scene
 
 FEW = 64  # bodies suffice likewise
-SOME = 256  # points of a body suffice to tell how far it is
+SOME = 64  # points of a body suffice to tell how far it is
 WANTED = 4.0  # pixels that a suggested wavelength's fringes take
 
 

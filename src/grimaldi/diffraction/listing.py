@@ -149,11 +149,19 @@ def _pairs(search: Search, blocks: Blocks, n: int) -> _Pairs:
     acts = dr.gather(mi.Bool, blocks.active, block)
     acts &= least_detour(fr, piece.middle, piece.reach + radius) <= tab.far
     acts &= dr.select(bend == 0, sounds(fr, piece, normal), dr.dot(normal, d) < radius + bend * dr.norm(d))
-    acts &= _finest(fr, search.k, blocks, block, piece) <= FINEST * max(AVERAGED / search.tolerance, 1.0)
-    found = places(acts)
+    found = _coarse(search, blocks, places(acts), n)
     block = found // n
     dr.eval(found, block)
     return _Pairs(block, found - block * n, found)
+
+
+def _coarse(search: Search, blocks: Blocks, found: Any, n: int) -> Any:
+    """The pairs among those found whose fringes are not finer than pixels."""
+    block = found // n
+    piece = search.tab.piece(found - block * n)
+    fr = frame(search.source, dr.gather(type(blocks.p), blocks.p, block), search.tab)
+    finest = _finest(fr, search.k, blocks, block, piece)
+    return dr.gather(mi.UInt32, found, places(finest <= FINEST * max(AVERAGED / search.tolerance, 1.0)))
 
 
 def _finest(fr: Frame, k: Any, blocks: Blocks, block: Any, piece: Piece) -> Any:

@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from grimaldi.diffraction.arrays import on_device, types
-from grimaldi.scene.bodies import indices, vertices
+from grimaldi.scene.bodies import indices, one_of, vertices
 from grimaldi.scene.model import Cylinder, Disk, Joined, Mesh, Scene, Sphere
-from grimaldi.scene.triangles import areas
 
 Reals = NDArray[np.float64]
 
 FLAT, CURVED = 1.0, 2.0  # shapes of other kinds: 0
+NOTHING = Mesh(np.zeros((1, 3)), np.zeros((1, 3), np.int64))
 
 ROUNDINGS = 32  # of Float32, that Mitsuba's point may lie off the surface that it names
 GRAZING = 1e-2  # sine of the angle between ray and surface below which a point may not move any further along the ray
@@ -80,23 +80,20 @@ def hits(scene: Scene) -> Hits:
     """All surfaces of a scene that are flat or quadrics, for the Mitsuba variant in use."""
     index = indices(scene.mitsuba)
     shapes = np.zeros((int(index.max(initial=0)) + 1, 4))
-    planes, quadrics = [np.zeros((1, 4))], [np.zeros((1, 3, 4))]  # the device cannot gather from nothing
+    flat, quadrics = [NOTHING], [np.zeros((1, 3, 4))]  # the device cannot gather from nothing
     parts, count = [np.zeros(1)], len(shapes)
-    flat = 1
+    faces = 1
     for i, surface in zip(index, scene.surfaces, strict=True):
         if surface is None:
             continue
         reach = np.abs(vertices(surface)).max()
         if isinstance(surface, (Mesh, Disk)):
-            shapes[i] = FLAT, flat, isinstance(surface, Mesh), reach
-            planes.append(_planes(surface))
-            flat += len(planes[-1])
-            if isinstance(surface, Joined):
-                of_each = np.diff(surface.begin)
-                parts.append(count + np.repeat(np.arange(len(of_each)), of_each))
-                count += len(of_each)
-            else:
-                parts.append(np.zeros(len(planes[-1])))
+            shapes[i] = FLAT, faces, isinstance(surface, Mesh), reach
+            flat.append(surface if isinstance(surface, Mesh) else _triangle(surface))
+            own = surface.begin if isinstance(surface, Joined) else np.zeros(1, int)
+            number = np.repeat(count + np.arange(len(own) - 1), np.diff(own))
+            parts.append(number if len(number) else np.zeros(len(flat[-1].faces)))
+            faces, count = faces + len(flat[-1].faces), count + len(own) - 1
         else:
             shapes[i] = CURVED, len(quadrics), 0, reach
             quadrics.append(_quadric(surface))
@@ -104,22 +101,31 @@ def hits(scene: Scene) -> Hits:
     return Hits(
         buffer(shapes),
         on_device(mi.UInt32, len(shapes)),
-        buffer(np.concatenate(planes)),
+        _planes(one_of(flat)),
         buffer(np.concatenate(quadrics)),
         mi.UInt32(np.concatenate(parts).astype(np.uint32)) if count > len(shapes) else None,
     )
 
 
-def _planes(surface: Mesh | Disk) -> Reals:
-    """Unit normal and h (m, 4) of each face; NaN where its corners lie in line."""
-    if isinstance(surface, Mesh):
-        origin, X, Y = (surface.vertices[corner] for corner in surface.faces.T)
-    else:
-        X, Y, _, origin = surface.to_world[:3].T[:, None]
-        X, Y = origin + X, origin + Y
-    area, n = areas(origin, X, Y)
-    h = np.where(area.any(axis=1), (n * origin).sum(axis=1), np.nan)
-    return np.concatenate([n, h[:, None]], axis=1)
+def _triangle(disk: Disk) -> Mesh:
+    """One in its plane."""
+    X, Y, _, origin = disk.to_world[:3].T
+    return Mesh(np.stack([origin, origin + X, origin + Y]), np.array([[0, 1, 2]]))
+
+
+def _planes(mesh: Mesh) -> Any:
+    """Unit normal and h of each face, as packets; NaN where its corners lie in line."""
+    F, V, P = double = types(double=True)
+    corners, faces = double.buffer(mesh.vertices), mi.UInt32(mesh.faces.astype(np.uint32).ravel())
+    i = dr.arange(mi.UInt32, len(mesh.faces))
+    a, b, c = (dr.gather(V, corners, dr.gather(mi.UInt32, faces, 3 * i + corner)) for corner in range(3))
+    n = dr.cross(b - a, c - a)
+    size = dr.norm(n)
+    n = n * dr.rcp(dr.maximum(size, 1e-300))
+    planes = dr.zeros(F, 4 * len(mesh.faces))
+    dr.scatter(planes, P(n.x, n.y, n.z, dr.select(size > 0, dr.dot(n, a), dr.nan)), i)
+    dr.eval(planes)
+    return planes
 
 
 def _quadric(surface: Sphere | Cylinder) -> Reals:
