@@ -38,7 +38,7 @@ from grimaldi.diffraction.model import OUTSIDE, Blocks, Evaluate, Factor, Groupe
 from grimaldi.diffraction.occlusion import Rays, rays
 from grimaldi.diffraction.screen import beyond
 from grimaldi.diffraction.segment import Rule
-from grimaldi.diffraction.table import Table, needs_double, table
+from grimaldi.diffraction.table import Packed, Table, needs_double, packed
 from grimaldi.outlines.model import Outline
 from grimaldi.outlines.silhouettes import silhouettes
 from grimaldi.scene.model import Scene, Source
@@ -59,6 +59,7 @@ class Problem(NamedTuple):
     outline: Outline
     k: float
     options: Options
+    packed: Packed  # the outline
     grazed: Outline | None  # all silhouettes, for occlusion "graded"
 
     def rule(self) -> Rule:
@@ -80,7 +81,8 @@ def boundary(scene: Scene, source: Source, outline: Outline, k: float, options: 
             return none.none(scene, source, outline, k, options)
         return _rays_alone(scene, source)
     graded = options.occlusion == "graded" and not scene.screen
-    problem = Problem(scene, source, outline, k, options, silhouettes(scene, source) if graded else None)
+    grazed = silhouettes(scene, source) if graded else None
+    problem = Problem(scene, source, outline, k, options, packed(outline, source), grazed)
     of_kind = _planar if scene.screen else _bodies
     double = of_kind(problem, types(double=True))
     if needs_double(outline, k, options):
@@ -155,7 +157,7 @@ def _rounding(tab: Table, fr: Frame, k: float, margins: Margins) -> Any:
 def _planar(problem: Problem, precision: Types) -> Evaluate:
     """Coplanar holes in a screen, or masks; M = 1 on the source's own side."""
     screen, source = problem.scene.screen[0], problem.source
-    tab = table(problem.outline, source, precision)
+    tab = problem.packed.on(precision)
     rule, k = problem.rule(), problem.k
     far = beyond(screen, source)
 
@@ -190,13 +192,13 @@ def unoccluded(problem: Problem, precision: Types) -> tuple[int, Callable[[Any, 
 
     It gives Δ at the piece's middle, and (1/2π) ∫ C e^{ikΔ} dφ along it (real, imaginary), nothing in between.
     """
-    tab = table(problem.outline, problem.source, precision)
+    tab = problem.packed.on(precision)
     rule, k = problem.rule(), tab.device(problem.k)
 
     def evaluate(p: Any, i: Any) -> tuple[Any, Any, Any]:
         fr = frame(problem.source, p, tab)
         piece = tab.piece(i)
-        acts = sounds(fr, piece, dr.zeros(type(p), dr.width(p)))
+        acts = sounds(fr, piece, dr.zeros(precision.Vector, dr.width(p)))
         wave = chain_wave(fr, tab, piece.first, piece.end, k, rule, None, False, acts).wave
         scale = dr.select(acts, 0.5 / np.pi, 0)
         return least_detour(fr, piece.middle, 0), scale * wave.real, scale * wave.imag
@@ -212,12 +214,12 @@ class _Bodies:
     """Past bodies: of all pieces, or of those on the lists of the receivers' blocks."""
 
     def __init__(self, problem: Problem, precision: Types) -> None:
-        scene, source, outline, _, options, grazed = problem
+        scene, source, outline, _, options, _, grazed = problem
         tolerance = options.tolerance
         self.problem = problem
         self.rule = problem.rule()
         self.rays = rays(scene, source, outline.sag)
-        self.tab = table(outline, source, precision, angle=AS_ONE * tolerance)
+        self.tab = problem.packed.on(precision, AS_ONE * tolerance)
         self.k = self.tab.device(problem.k)
         self.share = UNASKED * tolerance / self.items
         self.grazing = None if grazed is None else chords(grazed, self.tab.centre, precision)

@@ -27,7 +27,7 @@ from grimaldi.diffraction.model import NYQUIST, Evaluate, Factor, Options, Recei
 from grimaldi.diffraction.occlusion import Rays, rays
 from grimaldi.diffraction.screen import beyond
 from grimaldi.diffraction.segment import Line, detour, line, sincos
-from grimaldi.diffraction.table import Segment, Table, needs_double, table
+from grimaldi.diffraction.table import Segment, Table, needs_double, packed
 from grimaldi.errors import InputError
 from grimaldi.outlines.divided import divided, joined
 from grimaldi.outlines.model import Integers, Outline, Reals
@@ -79,7 +79,7 @@ def huygens(scene: Scene, source: Source, outline: Outline, k: float, options: O
     if len(outline) == 0:
         return geometric
     sources = divided(outline, _parts(outline, k, options))
-    tab = table(sources, source, types(needs_double(outline, k, options)), np.arange(len(sources) + 1))
+    tab = packed(sources, source, np.arange(len(sources) + 1)).on(types(needs_double(outline, k, options)))
     lengths = np.linalg.norm(sources.end - sources.start, axis=1)
     if options.weights == "report":
         lengths = _shared(lengths, sources.body)

@@ -12,7 +12,7 @@ from grimaldi.diffraction.edges import planar_count
 from grimaldi.diffraction.frame import constant, frame
 from grimaldi.diffraction.model import Evaluate, Factor, Options, Receivers
 from grimaldi.diffraction.screen import beyond
-from grimaldi.diffraction.table import table
+from grimaldi.diffraction.table import packed
 from grimaldi.outlines.model import Outline
 from grimaldi.scene.model import Scene, Source
 
@@ -53,7 +53,7 @@ def _lit(scene: Scene, source: Source, receivers: Receivers) -> Any:
 
 
 def _planar(scene: Scene, source: Source, outline: Outline) -> Evaluate:
-    tab = table(outline, source, types(double=True))
+    tab = packed(outline, source).on(types(double=True))
     far = beyond(scene.screen[0], source)
 
     def evaluate(receivers: Receivers) -> Factor:

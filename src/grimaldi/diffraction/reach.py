@@ -5,11 +5,12 @@ from __future__ import annotations
 import drjit as dr
 import numpy as np
 
-from grimaldi.diffraction.arrays import on_device, types
+from grimaldi.diffraction.arrays import types
 from grimaldi.diffraction.boundary import Problem, unoccluded
 from grimaldi.diffraction.edges import taper
+from grimaldi.diffraction.frame import constant
 from grimaldi.diffraction.model import Options
-from grimaldi.diffraction.table import MANY, cut
+from grimaldi.diffraction.table import MANY, cut, needs_double, packed
 from grimaldi.outlines.model import Outline, Reals
 from grimaldi.scene.model import Scene, Source
 
@@ -28,7 +29,7 @@ def reach(scene: Scene, source: Source, outline: Outline, k: float, options: Opt
         return np.inf
     points = where[np.linspace(0, len(where) - 1, min(POINTS, len(where))).astype(int)]
     rungs = LADDER / k
-    left_out = _left_out(Problem(scene, source, outline, k, options, None), points, rungs)
+    left_out = _left_out(Problem(scene, source, outline, k, options, packed(outline, source), None), points, rungs)
     too_near = np.flatnonzero(~(left_out <= LEFT_OUT * options.tolerance))
     return float(rungs[too_near[-1] + 1]) if len(too_near) and too_near[-1] + 1 < len(LADDER) else np.inf
 
@@ -38,15 +39,16 @@ def _left_out(problem: Problem, points: Reals, rungs: Reals) -> Reals:
 
     A piece's wave is left out as a whole at rungs before its Δ, in part at the next one, and not at all at others.
     """
-    double = types(double=True)
-    number, wave = unoccluded(problem, double)
-    piece = dr.arange(dr.uint32_array_t(double.Float), number)
-    ends = double.buffer(np.append(rungs, np.inf))
+    precision = types(needs_double(problem.outline, problem.k, problem.options))
+    F = precision.Float
+    number, wave = unoccluded(problem, precision)
+    piece = dr.arange(dr.uint32_array_t(F), number)
+    ends = precision.buffer(np.append(rungs, np.inf))
     most = np.zeros(len(rungs))
     for point in points:
-        delta, real, imag = wave(double.Vector(*(on_device(double.Float, x) for x in point)), piece)
+        delta, real, imag = wave(constant(types(double=True).Vector, point), piece)
         octave = dr.clip(dr.ceil(dr.log2(dr.maximum(delta, 1e-300) / rungs[0])), 0, len(rungs))
-        part = 1 - taper(delta / dr.gather(double.Float, ends, type(piece)(octave)))
+        part = 1 - taper(delta / dr.gather(F, ends, type(piece)(octave)))
         dr.eval(real, imag, octave, part)
         M, rung = real.numpy() + 1j * imag.numpy(), octave.numpy().astype(np.int64)
         whole, partly = (

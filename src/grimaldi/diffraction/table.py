@@ -136,13 +136,43 @@ def needs_double(outline: Outline, k: float, options: Options) -> bool:
     return k * float(extent) * len(outline) ** 0.5 * 2.0**-24 > 3 * options.tolerance
 
 
-def table(
-    outline: Outline,
-    source: Source,
-    types: Types,
-    ranges: NDArray[np.int64] | None = None,
-    angle: float = 0.0,
-) -> Table:
+class Packed(NamedTuple):
+    """An outline about its centre as rows of numbers, for tables in either precision."""
+
+    centre: Vector
+    reach: float
+    from_source: float
+    segments: Reals  # (n, 12)
+    runs: NDArray[np.int64]  # (m, 2) first segment and the one after the last, of pieces and then of longer runs
+    pieces: Reals  # (m, 20)
+    ranges: NDArray[np.int64]
+    follows: NDArray[np.bool_]
+    plan: Layout
+    item: NDArray[np.int64]
+    far: float
+
+    def on(self, types: Types, angle: float = 0.0) -> Table:
+        """The table in some precision; angle as in `Table`."""
+        index = dr.uint32_array_t(types.Float)
+        return Table(
+            self.centre,
+            self.reach,
+            self.from_source,
+            on_device(index, len(self.segments)),
+            on_device(index, len(self.plan.order)),
+            types.buffer(self.segments),
+            index(self.runs.ravel().astype(np.uint32)),
+            types.buffer(self.pieces),
+            index(np.repeat(np.arange(len(self.ranges) - 1), np.diff(self.ranges)).astype(np.uint32)),
+            dr.mask_t(types.Float)(self.follows),
+            self.plan.tree(self.item, types),
+            on_device(types.Float, min(self.far, 1e30)),
+            on_device(types.Float, angle),
+            types,
+        )
+
+
+def packed(outline: Outline, source: Source, ranges: NDArray[np.int64] | None = None) -> Packed:
     """Pack what a source sees; its pieces begin at the segments `ranges`, the last of which is their number (`cut`)."""
     ends = np.concatenate([outline.start, outline.end])
     low, high = ends.min(0), ends.max(0)
@@ -173,22 +203,18 @@ def table(
         ],
         1,
     )
-    index = dr.uint32_array_t(types.Float)
-    return Table(
+    return Packed(
         centre,
         float(np.linalg.norm(np.concatenate([X0, X1]), axis=1).max()),
         np.inf if source.position is None else float(outline.distances(source.position).min()),
-        on_device(index, len(outline)),
-        on_device(index, len(plan.order)),
-        types.buffer(segments),
-        index(runs.ravel().astype(np.uint32)),
-        types.buffer(pieces),
-        index(np.repeat(np.arange(len(ranges) - 1), np.diff(ranges)).astype(np.uint32)),
-        dr.mask_t(types.Float)(np.append(False, outline.chain[ranges[1:-1]] == outline.chain[ranges[1:-1] - 1])),
-        plan.tree(item, types),
-        on_device(types.Float, min(outline.far, 1e30)),
-        on_device(types.Float, angle),
-        types,
+        segments,
+        runs,
+        pieces,
+        ranges,
+        np.append(False, outline.chain[ranges[1:-1]] == outline.chain[ranges[1:-1] - 1]),
+        plan,
+        item,
+        outline.far,
     )
 
 

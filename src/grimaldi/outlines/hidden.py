@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,7 +19,7 @@ from grimaldi.scene.bodies import vertices
 from grimaldi.scene.model import Body, Cylinder, Disk, Mesh, Source, Sphere
 
 TOUCHING = 1e-9  # of the way to the source (of the edges' extent for a plane wave): no nearer blocker counts
-PART = 1 << 16  # triangles at once
+PART = 1 << 15  # triangles at once
 PAIRS = 1 << 14  # of a point and what may hide it at once: what fits the cache
 
 
@@ -112,15 +114,19 @@ class Sight:
 
 
 def _triangles(soup: Soup, view: View, edges: Candidates, pieces: Pieces) -> Iterator[tuple[Integers, Integers]]:
-    """Pairs (piece, triangle) that overlap in view, in parts."""
+    """Pairs (piece, triangle) that overlap in view, in parts, each by a thread of its own: NumPy lets them run."""
     seen = view(soup.points)
-    for begin in range(0, len(soup), PART):
+
+    def pairs(begin: int) -> tuple[Integers, Integers]:
         corners = [seen.take(c, axis=1) for c in soup.corners[:, begin : begin + PART]]
         triangle, piece = pieces.index.overlapping(*view.boxes(*corners))
         edge, number = pieces.edge[piece], begin + triangle
         beside = (edges.faces[edge, 0] == number) | (edges.faces[edge, 1] == number)
         kept = ~beside & pieces.may_be_met(piece, [c.take(triangle, axis=1) for c in corners])
-        yield piece[kept], number[kept]
+        return piece[kept], number[kept]
+
+    with ThreadPoolExecutor(os.cpu_count()) as threads:
+        yield from threads.map(pairs, range(0, len(soup), PART))
 
 
 def _shapes(bodies: Sequence[Body], offset: int, view: View, pieces: Pieces) -> tuple[Integers, Integers]:

@@ -44,7 +44,7 @@ def joined(scene: Scene) -> Scene:
     surfaces: list[Geometry | None] = [scene.surfaces[i] for i in np.flatnonzero(own)]
     for look, group in groups.items():
         place[group] = len(kept)
-        surfaces.append(one_of([scene.surfaces[i] for i in group]))
+        surfaces.append(one_of([surface for i in group if isinstance(surface := scene.surfaces[i], Mesh)]))
         kept.append(_shape_of(surfaces[-1], look, shapes[group[0]].bsdf()))
     return replace(
         scene,

@@ -102,8 +102,8 @@ Geometry = Mesh | Sphere | Disk | Cylinder
 class Body:
     """An opaque shape that casts outlines.
 
-    `shape` is the index in `mi.Scene.shapes()` of what shows it, alone or joined to others; `facets` stands for the geometry of a mesh that has much more triangles
-    than its plane parts need.
+    `shape` is the index in `mi.Scene.shapes()` of what shows it, alone or joined to others; `facets` stands for the
+    geometry of a mesh that has much more triangles than its plane parts need.
     """
 
     name: str
