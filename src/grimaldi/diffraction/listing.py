@@ -141,7 +141,9 @@ def _pairs(search: Search, blocks: Blocks, n: int) -> _Pairs:
     index = dr.arange(mi.UInt32, dr.width(blocks.p) * n)
     block = index // n
     piece = tab.piece(index - block * n)
-    fr = frame(search.source, dr.gather(type(blocks.p), blocks.p, block), tab)
+    frames = frame(search.source, blocks.p, tab)
+    dr.eval(*frames[:5])  # once a block, not once a pair
+    fr = _of(frames, block)
     radius = tab.types.Float(dr.gather(mi.Float, blocks.radius, block))
     bend = tab.types.Float(dr.gather(mi.Float, blocks.bend, block))
     normal = tab.types.Vector(dr.gather(type(blocks.n), blocks.n, block))
@@ -149,18 +151,21 @@ def _pairs(search: Search, blocks: Blocks, n: int) -> _Pairs:
     acts = dr.gather(mi.Bool, blocks.active, block)
     acts &= least_detour(fr, piece.middle, piece.reach + radius) <= tab.far
     acts &= dr.select(bend == 0, sounds(fr, piece, normal), dr.dot(normal, d) < radius + bend * dr.norm(d))
-    found = _coarse(search, blocks, places(acts), n)
+    found = _coarse(search, blocks, frames, places(acts), n)
     block = found // n
     dr.eval(found, block)
     return _Pairs(block, found - block * n, found)
 
 
-def _coarse(search: Search, blocks: Blocks, found: Any, n: int) -> Any:
+def _of(frames: Frame, block: Any) -> Frame:
+    """The frames of some blocks."""
+    return Frame(*(dr.gather(type(values), values, block) for values in frames[:5]), frames.plane)
+
+
+def _coarse(search: Search, blocks: Blocks, frames: Frame, found: Any, n: int) -> Any:
     """The pairs among those found whose fringes are not finer than pixels."""
     block = found // n
-    piece = search.tab.piece(found - block * n)
-    fr = frame(search.source, dr.gather(type(blocks.p), blocks.p, block), search.tab)
-    finest = _finest(fr, search.k, blocks, block, piece)
+    finest = _finest(_of(frames, block), search.k, blocks, block, search.tab.piece(found - block * n))
     return dr.gather(mi.UInt32, found, places(finest <= FINEST * max(AVERAGED / search.tolerance, 1.0)))
 
 

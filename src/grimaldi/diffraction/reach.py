@@ -25,11 +25,13 @@ def reach(scene: Scene, source: Source, outline: Outline, k: float, options: Opt
     Waves of far edges come from corners and the ends of bodies and are as good as random in phase, unless bodies stand
     in a lattice; there this tells. Infinite where everything counts.
     """
-    if scene.screen or len(where) == 0 or len(outline) < MANY or len(cut(outline)) < MANY:
+    if scene.screen or len(where) == 0 or len(outline) < MANY or len(ranges := cut(outline)) < MANY:
         return np.inf
     points = where[np.linspace(0, len(where) - 1, min(POINTS, len(where))).astype(int)]
     rungs = LADDER / k
-    left_out = _left_out(Problem(scene, source, outline, k, options, packed(outline, source), None), points, rungs)
+    left_out = _left_out(
+        Problem(scene, source, outline, k, options, packed(outline, source, ranges), None), points, rungs
+    )
     too_near = np.flatnonzero(~(left_out <= LEFT_OUT * options.tolerance))
     return float(rungs[too_near[-1] + 1]) if len(too_near) and too_near[-1] + 1 < len(LADDER) else np.inf
 
@@ -47,14 +49,14 @@ def _left_out(problem: Problem, points: Reals, rungs: Reals) -> Reals:
     most = np.zeros(len(rungs))
     for point in points:
         delta, real, imag = wave(constant(types(double=True).Vector, point), piece)
-        octave = dr.clip(dr.ceil(dr.log2(dr.maximum(delta, 1e-300) / rungs[0])), 0, len(rungs))
+        octave = dr.clip(dr.ceil(dr.log2(dr.maximum(delta, 1e-30) / rungs[0])), 0, len(rungs))
         part = 1 - taper(delta / dr.gather(F, ends, type(piece)(octave)))
-        dr.eval(real, imag, octave, part)
-        M, rung = real.numpy() + 1j * imag.numpy(), octave.numpy().astype(np.int64)
-        whole, partly = (
-            np.bincount(rung, m.real, len(rungs) + 1) + 1j * np.bincount(rung, m.imag, len(rungs) + 1)
-            for m in (M, M * part.numpy())
+        waves, rung = (real, imag, part * real, part * imag), type(piece)(octave)
+        dr.eval(waves, rung)
+        real, imag, partly_real, partly_imag = (
+            np.bincount(rung.numpy(), wave.numpy(), len(rungs) + 1) for wave in waves
         )
+        whole, partly = real + 1j * imag, partly_real + 1j * partly_imag
         beyond = np.cumsum(whole[:0:-1])[::-1]
         most = np.maximum(most, np.abs(beyond + partly[:-1]))
     return most

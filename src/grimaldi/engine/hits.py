@@ -81,7 +81,7 @@ def hits(scene: Scene) -> Hits:
     index = indices(scene.mitsuba)
     shapes = np.zeros((int(index.max(initial=0)) + 1, 4))
     flat, quadrics = [NOTHING], [np.zeros((1, 3, 4))]  # the device cannot gather from nothing
-    parts, count = [np.zeros(1)], len(shapes)
+    parts, count = [np.zeros(1, int)], len(shapes)
     faces = 1
     for i, surface in zip(index, scene.surfaces, strict=True):
         if surface is None:
@@ -92,7 +92,7 @@ def hits(scene: Scene) -> Hits:
             flat.append(surface if isinstance(surface, Mesh) else _triangle(surface))
             own = surface.begin if isinstance(surface, Joined) else np.zeros(1, int)
             number = np.repeat(count + np.arange(len(own) - 1), np.diff(own))
-            parts.append(number if len(number) else np.zeros(len(flat[-1].faces)))
+            parts.append(number if len(number) else np.zeros(len(flat[-1].faces), int))
             faces, count = faces + len(flat[-1].faces), count + len(own) - 1
         else:
             shapes[i] = CURVED, len(quadrics), 0, reach

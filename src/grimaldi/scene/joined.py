@@ -75,4 +75,6 @@ def _shape_of(surface: Any, look: _Look, bsdf: Any) -> Any:
 
     props = mi.Properties()
     props["bsdf"], props["flip_normals"] = bsdf, look.flipped
-    return as_mesh(mi, "joined", surface.vertices, surface.faces, props)
+    mesh = as_mesh(mi, "joined", surface.vertices, surface.faces, props)
+    mesh.set_id("joined")
+    return mesh
