@@ -74,7 +74,7 @@ def layout(centre: NDArray[np.float64], radius: NDArray[np.float64], group: NDAr
     n = len(centre)
     _, of = np.unique(group, return_inverse=True)
     place = morton(np.stack([np.bincount(of, x) for x in centre.T], axis=1) / np.bincount(of)[:, None])
-    order = np.lexsort((np.arange(n), of, place[of]))
+    order = np.argsort(np.argsort(np.argsort(place, kind="stable"))[of], kind="stable")
     centre, radius = centre[order], radius[order]
     blocks = _blocks(n)
     total = n + sum(-(-n // b) for b in blocks)

@@ -137,21 +137,23 @@ def lists(search: Search, blocks: Blocks) -> Lists:
 
 def _pairs(search: Search, blocks: Blocks, n: int) -> _Pairs:
     """Which of n pieces may act somewhere in a block: within the outlines' reach, and above some horizon."""
-    tab = search.tab
-    index = dr.arange(mi.UInt32, dr.width(blocks.p) * n)
-    block = index // n
-    piece = tab.piece(index - block * n)
+    tab, F = search.tab, search.tab.types.Float
     frames = frame(search.source, blocks.p, tab)
     dr.eval(*frames[:5])  # once a block, not once a pair
-    fr = _of(frames, block)
-    radius = tab.types.Float(dr.gather(mi.Float, blocks.radius, block))
-    bend = tab.types.Float(dr.gather(mi.Float, blocks.bend, block))
+    index = dr.arange(mi.UInt32, dr.width(blocks.p) * n)
+    block = index // n
+    middle, reach = tab.sphere(index - block * n)
+    detour = least_detour(_of(frames, block), middle, reach + F(dr.gather(mi.Float, blocks.radius, block)))
+    found = places(dr.gather(mi.Bool, blocks.active, block) & (detour <= tab.far))
+
+    block = found // n
+    piece, fr = tab.piece(found - block * n), _of(frames, block)
+    radius, bend = (F(dr.gather(mi.Float, of, block)) for of in (blocks.radius, blocks.bend))
     normal = tab.types.Vector(dr.gather(type(blocks.n), blocks.n, block))
     d = fr.foot + fr.z2 * fr.a - piece.middle
-    acts = dr.gather(mi.Bool, blocks.active, block)
-    acts &= least_detour(fr, piece.middle, piece.reach + radius) <= tab.far
-    acts &= dr.select(bend == 0, sounds(fr, piece, normal), dr.dot(normal, d) < radius + bend * dr.norm(d))
-    found = _coarse(search, blocks, frames, places(acts), n)
+    acts = dr.select(bend == 0, sounds(fr, piece, normal), dr.dot(normal, d) < radius + bend * dr.norm(d))
+    acts &= _finest(fr, search.k, blocks, block, piece) <= FINEST * max(AVERAGED / search.tolerance, 1.0)
+    found = dr.gather(mi.UInt32, found, places(acts))
     block = found // n
     dr.eval(found, block)
     return _Pairs(block, found - block * n, found)
@@ -159,14 +161,8 @@ def _pairs(search: Search, blocks: Blocks, n: int) -> _Pairs:
 
 def _of(frames: Frame, block: Any) -> Frame:
     """The frames of some blocks."""
-    return Frame(*(dr.gather(type(values), values, block) for values in frames[:5]), frames.plane)
-
-
-def _coarse(search: Search, blocks: Blocks, frames: Frame, found: Any, n: int) -> Any:
-    """The pairs among those found whose fringes are not finer than pixels."""
-    block = found // n
-    finest = _finest(_of(frames, block), search.k, blocks, block, search.tab.piece(found - block * n))
-    return dr.gather(mi.UInt32, found, places(finest <= FINEST * max(AVERAGED / search.tolerance, 1.0)))
+    a, foot, z1, z2, lever = (dr.gather(type(values), values, block) for values in frames[:5])
+    return Frame(a, foot, z1, z2, lever, frames.plane)
 
 
 def _finest(fr: Frame, k: Any, blocks: Blocks, block: Any, piece: Piece) -> Any:

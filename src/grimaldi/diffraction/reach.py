@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import drjit as dr
+import mitsuba
 import numpy as np
 
 from grimaldi.diffraction.arrays import types
@@ -13,6 +16,8 @@ from grimaldi.diffraction.model import Options
 from grimaldi.diffraction.table import MANY, cut, needs_double, packed
 from grimaldi.outlines.model import Outline, Reals
 from grimaldi.scene.model import Scene, Source
+
+mi: Any = mitsuba  # the stubs refuse numbers where arrays are asked for
 
 POINTS = 64  # where it is measured
 LEFT_OUT = 0.3  # of the tolerance, at most at these points
@@ -51,7 +56,7 @@ def _left_out(problem: Problem, points: Reals, rungs: Reals) -> Reals:
         delta, real, imag = wave(constant(types(double=True).Vector, point), piece)
         octave = dr.clip(dr.ceil(dr.log2(dr.maximum(delta, 1e-30) / rungs[0])), 0, len(rungs))
         part = 1 - taper(delta / dr.gather(F, ends, type(piece)(octave)))
-        waves, rung = (real, imag, part * real, part * imag), type(piece)(octave)
+        waves, rung = (real, imag, part * real, part * imag), mi.Int64(octave)  # as bincount wants it
         dr.eval(waves, rung)
         real, imag, partly_real, partly_imag = (
             np.bincount(rung.numpy(), wave.numpy(), len(rungs) + 1) for wave in waves

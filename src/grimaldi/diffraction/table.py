@@ -83,6 +83,11 @@ class Table(NamedTuple):
         """The piece that a segment is part of."""
         return dr.gather(type(self.piece_of), self.piece_of, segment)
 
+    def sphere(self, i: Any) -> tuple[Any, Any]:
+        """Middle and reach of a piece."""
+        a = dr.gather(self.types.Packet, self.pieces, 5 * i)
+        return self.types.Vector(a.x, a.y, a.z), a.w
+
     def piece(self, i: Any) -> Piece:
         P, V = self.types.Packet, self.types.Vector
         a, b, c, d, e = (dr.gather(P, self.pieces, 5 * i + j) for j in range(5))

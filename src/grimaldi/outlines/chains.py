@@ -48,14 +48,17 @@ def _heads(before: Integers) -> tuple[Integers, Integers]:
     n = len(before)
     here = np.arange(n)
     jump, least = np.where(before < 0, here, before), here
-    for _ in range(n.bit_length()):
-        least = np.minimum(least, least[jump])
-        jump = jump[jump]
     open_ = before[jump] < 0  # where the way back ends
+    for _ in range(n.bit_length()):
+        less, jump = np.minimum(least, least[jump]), jump[jump]
+        ends = before[jump] < 0
+        done = (less == least).all() and (ends == open_).all()
+        least, open_ = less, ends
+        if done:
+            break
     head = np.where(open_, jump, least)
     jump = np.where(here == head, here, before)
     rank = (jump != here).astype(np.int64)
-    for _ in range(n.bit_length()):
-        rank = rank + rank[jump]
-        jump = jump[jump]
+    while (more := rank[jump]).any():
+        rank, jump = rank + more, jump[jump]
     return head, rank

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,7 +11,7 @@ from numpy.typing import NDArray
 from grimaldi.outlines.candidate import Candidates, toward
 from grimaldi.outlines.model import Integers, Reals
 from grimaldi.outlines.pieces import Pieces
-from grimaldi.outlines.soup import Soup, grouped
+from grimaldi.outlines.soup import Soup, by_threads, grouped
 from grimaldi.outlines.view import View
 from grimaldi.scene.bodies import vertices
 from grimaldi.scene.model import Body, Cylinder, Disk, Mesh, Source, Sphere
@@ -113,8 +111,8 @@ class Sight:
                 yield pair[met], t[met]
 
 
-def _triangles(soup: Soup, view: View, edges: Candidates, pieces: Pieces) -> Iterator[tuple[Integers, Integers]]:
-    """Pairs (piece, triangle) that overlap in view, in parts, each by a thread of its own: NumPy lets them run."""
+def _triangles(soup: Soup, view: View, edges: Candidates, pieces: Pieces) -> list[tuple[Integers, Integers]]:
+    """Pairs (piece, triangle) that overlap in view, in parts."""
     seen = view(soup.points)
 
     def pairs(begin: int) -> tuple[Integers, Integers]:
@@ -125,8 +123,7 @@ def _triangles(soup: Soup, view: View, edges: Candidates, pieces: Pieces) -> Ite
         kept = ~beside & pieces.may_be_met(piece, [c.take(triangle, axis=1) for c in corners])
         return piece[kept], number[kept]
 
-    with ThreadPoolExecutor(os.cpu_count()) as threads:
-        yield from threads.map(pairs, range(0, len(soup), PART))
+    return by_threads(pairs, range(0, len(soup), PART))
 
 
 def _shapes(bodies: Sequence[Body], offset: int, view: View, pieces: Pieces) -> tuple[Integers, Integers]:

@@ -7,18 +7,21 @@ matters. Each triangle's side is decided once: the edges of a closed mesh form c
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Callable
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from grimaldi.outlines.candidate import EDGE_ON, Candidates, edge_on, facing
 from grimaldi.outlines.model import Integers, Reals
-from grimaldi.outlines.soup import Soup
+from grimaldi.outlines.soup import Soup, by_threads
 from grimaldi.scene.model import Source
 from grimaldi.scene.triangles import areas
 
 PART = 1 << 15  # triangles at once: what fits the cache
+
+T = TypeVar("T")
 
 
 def sides(soup: Soup, source: Source) -> NDArray[np.int8]:
@@ -43,12 +46,17 @@ def sides(soup: Soup, source: Source) -> NDArray[np.int8]:
     some = np.flatnonzero(level)
     if len(some):
         a, area = _areas(soup, some)
-        middle = _middles(soup)[:, soup.body[some]]
+        middle = _middles(soup, soup.body[some])
         side[some] = np.where(_dot(area, a - middle) < 0, -1, 1)
         standing = np.zeros(len(soup.first) - 1, bool)
         standing[soup.body[~level]] = True
         side[~standing[soup.body]] = 0
     return side
+
+
+def _of_parts(soup: Soup, find: Callable[[slice], T]) -> list[T]:
+    """What there is to find in each part of the triangles."""
+    return by_threads(find, (slice(first, first + PART) for first in range(0, len(soup), PART)))
 
 
 def _areas(soup: Soup, which: slice | Integers) -> tuple[Reals, Reals]:
@@ -62,10 +70,11 @@ def _dot(p: Any, q: Any) -> Any:
     return p[0] * q[0] + p[1] * q[1] + p[2] * q[2]
 
 
-def _middles(soup: Soup) -> Reals:
-    """The mean (3, bodies) of each body's corners."""
-    total = np.array([np.bincount(soup.body, x[soup.corners].sum(axis=0), len(soup.first) - 1) for x in soup.points])
-    return total / np.maximum(3 * np.diff(soup.first), 1)
+def _middles(soup: Soup, body: Integers) -> Reals:
+    """The mean (3, n) of all corners of bodies (n,)."""
+    bodies, of = np.unique(body, return_inverse=True)
+    means = [soup.triangles(np.arange(*soup.first[[i, i + 1]].tolist())).mean(axis=(1, 2)) for i in bodies]
+    return np.array(means).reshape(-1, 3).T[:, of]
 
 
 def silhouettes(soup: Soup, source: Source) -> tuple[Candidates, Integers]:
@@ -78,11 +87,21 @@ def silhouettes(soup: Soup, source: Source) -> tuple[Candidates, Integers]:
     n = soup.points.shape[1]
     # a fold's ends have triangles of both sides, a border's are told by `at_border`: few edges of a fine mesh do
     turned = np.zeros((2, n), bool)
-    for way, sign in enumerate((1, -1)):
-        turned[way, soup.corners[:, side == sign].ravel()] = True
+
+    def mark(part: slice) -> None:
+        for way, sign in enumerate((1, -1)):
+            turned[way, soup.corners[:, part][:, side[part] == sign].ravel()] = True
+
+    _of_parts(soup, mark)
     marked = (turned[0] & turned[1]) | soup.at_border
-    at_ends = marked[soup.corners] & (side != 0)
-    face, corner = np.nonzero((at_ends & np.roll(at_ends, -1, axis=0)).T)
+
+    def some(part: slice) -> tuple[Integers, Integers]:
+        at_ends = marked[soup.corners[:, part]] & (side[part] != 0)
+        face, corner = np.nonzero((at_ends & np.roll(at_ends, -1, axis=0)).T)
+        return part.start + face, corner
+
+    none = np.empty(0, np.int64)
+    face, corner = (np.concatenate([none, *parts]) for parts in zip((none, none), *_of_parts(soup, some), strict=True))
     tail, head = soup.corners[corner, face], soup.corners[(corner + 1) % 3, face]
 
     forward = tail < head
@@ -125,7 +144,7 @@ def normals_beside(
     # an edge-on face's normal points away from the other face, a lone one's from the middle of the mesh
     inward = (out2 > 0) != swap
     if (lone := level1 & ~two).any():
-        middle = _middles(soup)[:, soup.body[face1[lone]]].T
+        middle = _middles(soup, soup.body[face1[lone]]).T
         inward[lone] = np.einsum("ij,ij->i", n1[lone], x[lone] - middle) < 0
     n1 = np.where((level1 & inward)[:, None], -n1, n1)
     n2 = np.where((two & level2 & ((out1 > 0) == swap))[:, None], -n2, n2)

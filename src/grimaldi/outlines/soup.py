@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import os
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +15,11 @@ from numpy.typing import NDArray
 from grimaldi.outlines.model import Integers, Reals
 from grimaldi.scene.model import Geometry, Mesh
 from grimaldi.scene.triangles import merged_points
+
+PART = 1 << 15  # items of bodies at once: what fits the cache
+
+S = TypeVar("S")
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,12 +48,10 @@ class Soup:
         for (i, mesh), start in zip(meshes, offset[:-1], strict=True):
             np.add(mesh.faces.T, start, out=corners[:, first[i] : first[i + 1]])
         owner = np.repeat(np.array([i for i, _ in meshes], np.int64), n_points)
-        kept, number = merged_points(np.ascontiguousarray(points), owner)
-        if len(kept) == points.shape[1]:
-            kept, number = np.arange(len(kept)), np.arange(len(kept))
-        return Soup(
-            np.ascontiguousarray(points[:, kept]), number[corners], np.repeat(np.arange(len(shapes)), n_faces), first
-        )
+        kept, number = _merged(np.ascontiguousarray(points), owner, offset)
+        if len(kept) < points.shape[1]:
+            points, corners = points[:, kept], number[corners]
+        return Soup(np.ascontiguousarray(points), corners, np.repeat(np.arange(len(shapes)), n_faces), first)
 
     def __len__(self) -> int:
         return self.corners.shape[1]
@@ -64,17 +70,48 @@ class Soup:
     def at_border(self) -> NDArray[np.bool_]:
         """Whether points (n,) end an edge that is not shared by just two triangles of opposite winding."""
         n = self.points.shape[1]
-        ends = [(self.corners[i][self.has_corners], self.corners[i - 2][self.has_corners]) for i in range(3)]
-        # an edge's key is even one way round and odd the other, next to it when sorted
-        keys = np.sort(np.concatenate([(np.minimum(a, b) * n + np.maximum(a, b)) * 2 + (a > b) for a, b in ends]))
-        first = np.flatnonzero(np.append(True, np.diff(keys >> 1) != 0)[: len(keys)])
-        count = np.diff(np.append(first, len(keys)))
-        pair = (count == 2) & (keys[np.minimum(first + 1, len(keys) - 1)] != keys[first])
-        odd = keys[first[~pair]] >> 1
         result = np.zeros(n, bool)
-        result[odd // max(n, 1)] = True
-        result[odd % max(n, 1)] = True
+
+        def find(bounds: tuple[int, int]) -> None:
+            begin, end = bounds
+            corners = self.corners[:, begin:end]
+            corners = corners[:, self.has_corners[begin:end]]
+            ends = [(corners[i], corners[i - 2]) for i in range(3)]
+            # an edge's key is even one way round and odd the other, next to it when sorted
+            keys = np.sort(np.concatenate([(np.minimum(a, b) * n + np.maximum(a, b)) * 2 + (a > b) for a, b in ends]))
+            first = np.flatnonzero(np.append(True, np.diff(keys >> 1) != 0)[: len(keys)])
+            count = np.diff(np.append(first, len(keys)))
+            pair = (count == 2) & (keys[np.minimum(first + 1, len(keys) - 1)] != keys[first])
+            odd = keys[first[~pair]] >> 1
+            result[odd // n] = True
+            result[odd % n] = True
+
+        by_threads(find, _parts(self.first))
         return result
+
+
+def by_threads(do: Callable[[S], T], parts: Iterable[S]) -> list[T]:
+    """What `do` makes of each part: NumPy lets threads run."""
+    with ThreadPoolExecutor(os.cpu_count()) as threads:
+        return [*threads.map(do, parts)]
+
+
+def _parts(first: Integers) -> Iterator[tuple[int, int]]:
+    """Where parts of bodies begin and end, of some `PART` items each, given each body's first item and their number."""
+    marks = np.searchsorted(first, np.arange(0, first[-1] + PART, PART))
+    cuts = np.unique(np.append(first[np.minimum(marks, len(first) - 1)], first[-1]))
+    return zip(cuts[:-1].tolist(), cuts[1:].tolist(), strict=True)
+
+
+def _merged(points: Reals, owner: Integers, first: Integers) -> tuple[Integers, Integers]:
+    """`merged_points` of bodies that begin at points `first`, in parts."""
+    kept, number, count = [np.empty(0, np.int64)], np.empty(len(owner), np.int64), 0
+    for begin, end in _parts(first):
+        own, number[begin:end] = merged_points(np.ascontiguousarray(points[:, begin:end]), owner[begin:end])
+        number[begin:end] += count
+        kept.append(begin + own)
+        count += len(own)
+    return np.concatenate(kept), number
 
 
 def grouped(numbers: Integers) -> Iterator[tuple[int, Integers]]:
