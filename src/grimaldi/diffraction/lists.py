@@ -99,10 +99,14 @@ class Listed(NamedTuple):
     def bounds(self, receivers: Receivers) -> tuple[Any, Any]:
         return self.lists.tested.bounds(receivers.block, receivers.active)
 
+    @dr.syntax
     def asks(self, fr: Frame, i: Any) -> Any:
         """Whether the piece at a place takes a ray."""
-        piece = self.table.piece(self.lists.tested.item(i))
-        return self.lists.asks(i, self.cell) & (cut_off(fr, piece, self.k) >= self.weak)
+        ask = self.lists.asks(i, self.cell)
+        if ask:
+            piece = self.table.piece(self.lists.tested.item(i))
+            ask &= cut_off(fr, piece, self.k) >= self.weak
+        return ask
 
     def visit(self, fr: Frame, i: Any) -> tuple[Any, Any, Any]:
         ask = self.asks(fr, i)
