@@ -236,7 +236,7 @@ class _Bodies:
         fr = frame(self.problem.source, receivers.p, self.tab)
         beside = found.near(receivers, self.grazing)
         weak = self.tab.device(WEAK_HERE * self.problem.options.tolerance)
-        walk = Listed(found, receivers.cell, self.tab, self.k, weak)
+        walk = Listed(found, self.tab, self.k, weak)
         tested = self._sum(fr, walk, 0.0, beside, receivers)
         return self._factor(fr, receivers, listed_sum(fr, walk, self.rule, tested, receivers))
 

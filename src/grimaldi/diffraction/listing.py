@@ -6,6 +6,7 @@ the block is on no list: it takes no part in means over pixels.
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any, NamedTuple
 
 import drjit as dr
@@ -17,7 +18,7 @@ from grimaldi.diffraction.edges import cut_off, sounds
 from grimaldi.diffraction.frame import Frame, constant, frame
 from grimaldi.diffraction.grazing import Chords, Near, near, other_than, worth
 from grimaldi.diffraction.hierarchy import least_detour
-from grimaldi.diffraction.lists import List, Lists, places
+from grimaldi.diffraction.lists import List, Lists, Runs, places
 from grimaldi.diffraction.model import ACROSS, LATTICE, Blocks, Receivers
 from grimaldi.diffraction.occlusion import Rays
 from grimaldi.diffraction.segment import Corners
@@ -118,20 +119,58 @@ def lists(search: Search, blocks: Blocks) -> Lists:
     left = dr.zeros(mi.UInt64, number)
     dr.scatter_add(left, mi.UInt64(dr.ceil(left2 / unit)), pairs.block)
     first, end = tab.range(pairs.piece)
-    asked, reached = _verdicts(search, blocks, pairs, tested, seen)
-    some = (asked | reached) != 0
-    place = places(some)
-    dr.eval(begins, stops, first, end, goes_on, some)
+    cells = _in_cells(search, pairs, number, _verdicts(search, blocks, pairs, tested, seen))
+    dr.eval(begins, stops, first, end, goes_on)
     return Lists(
-        List.of(some, pairs.block, number, pairs.piece),
-        dr.gather(mi.UInt32, asked, place),
-        dr.gather(mi.UInt32, reached, place),
-        List.of(kept & ~along, pairs.block, number, first),
-        List.of(kept & ~goes_on, pairs.block, number, end - 1),
+        dr.opaque(mi.UInt32, number),
+        *cells,
+        Runs(
+            List.of(kept & ~along, pairs.block, number, first),
+            List.of(kept & ~goes_on, pairs.block, number, end - 1),
+        ),
         List.of(begins & strong[0], pairs.block, number, first),
         List.of(stops & strong[1], pairs.block, number, end - 1),
         dr.sqrt(mi.Float(left) * unit) / (2 * np.pi),
         beside,
+    )
+
+
+def _in_cells(
+    search: Search, pairs: _Pairs, number: int, verdicts: tuple[Any, Any]
+) -> tuple[List, List, Any, Any, Runs]:
+    """Those lists of cells of `number` blocks that `Lists` has, by what `_verdicts` says of pairs."""
+    tab, cells = search.tab, ACROSS * ACROSS
+    pair = places((verdicts[0] | verdicts[1]) != 0)
+    asked, reached, block, piece = (dr.gather(mi.UInt32, v, pair) for v in (*verdicts, pairs.block, pairs.piece))
+    dr.eval(asked, reached, block, piece)
+    count = dr.opaque(mi.UInt32, len(pair))
+    index = dr.arange(mi.UInt32, cells * len(pair))
+    cell = index // count
+    entry = index - cell * count
+    bits = dr.gather(mi.UInt32, reached, entry) >> ((cell // ACROSS) * LATTICE + cell % ACROSS)
+    corners = (bits & 3) | ((bits >> (LATTICE - 2)) & 12)
+    asks = ((dr.gather(mi.UInt32, asked, entry) >> cell) & 1) != 0
+    whole = ~asks & (corners == 15)
+    own = dr.gather(mi.UInt32, piece, entry)
+    before = dr.maximum(index, 1) - 1
+    dr.eval(corners, asks, whole)
+    follows = dr.gather(mi.Bool, tab.follows, own) & (entry > 0)
+    follows &= (dr.gather(mi.UInt32, piece, before - cell * count) + 1 == own) & dr.gather(mi.Bool, whole, before)
+    follows &= dr.gather(mi.UInt32, block, before - cell * count) == dr.gather(mi.UInt32, block, entry)
+    along = whole & follows
+    dr.eval(along)
+    goes_on = (index < len(index) - 1) & dr.gather(mi.Bool, along, dr.minimum(index + 1, len(index) - 1))
+    place = cell * dr.opaque(mi.UInt32, number) + dr.gather(mi.UInt32, block, entry)
+    partly = (corners > 0) & ~whole
+    first, end = tab.range(own)
+    places_of = partial(List.of, block=place, blocks=cells * number)
+    some = places(partly)
+    return (
+        places_of(asks, items=own),
+        places_of(partly, items=own),
+        dr.gather(mi.UInt32, corners, some),
+        dr.gather(mi.Bool, asks, some),
+        Runs(places_of(whole & ~along, items=first), places_of(whole & ~goes_on, items=end - 1)),
     )
 
 

@@ -16,7 +16,7 @@ from grimaldi.diffraction.corners import corner, leading
 from grimaldi.diffraction.edges import Chain, Margins, Nearest, Sum, chain_wave, cut_off
 from grimaldi.diffraction.frame import Frame
 from grimaldi.diffraction.grazing import Chords, Near
-from grimaldi.diffraction.model import ACROSS, LATTICE, Receivers
+from grimaldi.diffraction.model import Receivers
 from grimaldi.diffraction.segment import Rule
 from grimaldi.diffraction.table import Piece, Table
 
@@ -54,29 +54,40 @@ def places(flags: Any) -> Any:
     return found if len(found) else dr.zeros(mi.UInt32, 1)
 
 
-class Lists(NamedTuple):
-    """What acts on each block: pieces to be tested, runs of segments that reach it, ends of runs, |M| left out."""
+class Runs(NamedTuple):
+    """Segments that follow each other: where runs begin, and the last of each."""
 
-    tested: List  # pieces
-    asked: Any  # of each of those a bit for each cell where it is tested at every receiver
-    reached: Any  # elsewhere it reaches corners of cells, a bit for each, and what lies between in part
-    first: List  # segments where runs begin
-    last: List  # and the last of each
-    begins: List  # segments at whose start a far run begins
+    first: List
+    last: List
+
+
+class Lists(NamedTuple):
+    """What acts on each block, or on each cell: pieces, runs of segments that reach it, ends of runs, |M| left out.
+
+    Cell c of block b has the place c · blocks + b in lists of cells.
+    """
+
+    blocks: Any  # how many
+    asked: List  # of cells: pieces that each receiver asks for
+    partly: List  # of cells: pieces that reach it in part, and those asked that may do so without a ray
+    corners: Any  # of each of those a bit for each corner of the cell that it reaches; what lies between in part
+    asks: Any  # of each of those whether it is asked for
+    whole: Runs  # of cells: those of pieces that reach it, but not all of the block as far as is known
+    runs: Runs  # of blocks
+    begins: List  # of blocks: segments at whose start a far run begins
     stops: List  # and at whose end one stops
     left: Any
     beside: Near | None  # the bodies whose silhouettes pass closest by each
 
-    def asks(self, i: Any, cell: Any) -> Any:
-        """Whether a piece to be tested is asked for at each receiver in a cell."""
-        return ((dr.gather(mi.UInt32, self.asked, i) >> cell) & 1) != 0
+    def cell(self, receivers: Receivers) -> Any:
+        """The places of receivers' cells."""
+        return receivers.cell * self.blocks + receivers.block
 
     def share(self, i: Any, receivers: Receivers) -> Any:
         """How much of a piece reaches receivers, by the corners of their cells: between them it grows evenly."""
-        cell = receivers.cell
-        bits = dr.gather(mi.UInt32, self.reached, i) >> ((cell // ACROSS) * LATTICE + cell % ACROSS)
+        bits = dr.gather(mi.UInt32, self.corners, i)
         near, far = (
-            dr.lerp(mi.Float((bits >> row) & 1), mi.Float((bits >> (row + 1)) & 1), receivers.u) for row in (0, LATTICE)
+            dr.lerp(mi.Float((bits >> row) & 1), mi.Float((bits >> (row + 1)) & 1), receivers.u) for row in (0, 2)
         )
         return dr.lerp(near, far, receivers.v)
 
@@ -88,29 +99,24 @@ class Lists(NamedTuple):
 
 
 class Listed(NamedTuple):
-    """The pieces that reach part of the receivers' blocks, as a walk."""
+    """The pieces that receivers ask for, as a walk."""
 
     lists: Lists
-    cell: Any  # of the receivers, in their blocks
     table: Table
     k: Any
     weak: Any  # |M| of an end, below which no ray is asked for
 
     def bounds(self, receivers: Receivers) -> tuple[Any, Any]:
-        return self.lists.tested.bounds(receivers.block, receivers.active)
+        return self.lists.asked.bounds(self.lists.cell(receivers), receivers.active)
 
-    @dr.syntax
-    def asks(self, fr: Frame, i: Any) -> Any:
-        """Whether the piece at a place takes a ray."""
-        ask = self.lists.asks(i, self.cell)
-        if ask:
-            piece = self.table.piece(self.lists.tested.item(i))
-            ask &= cut_off(fr, piece, self.k) >= self.weak
-        return ask
+    def strong(self, fr: Frame, piece: Any) -> Any:
+        """Whether a piece takes a ray here."""
+        return cut_off(fr, self.table.piece(piece), self.k) >= self.weak
 
     def visit(self, fr: Frame, i: Any) -> tuple[Any, Any, Any]:
-        ask = self.asks(fr, i)
-        return self.lists.tested.item(i), ask, ask
+        piece = self.lists.asked.item(i)
+        strong = self.strong(fr, piece)
+        return piece, strong, strong
 
     def after(self, i: Any, inside: Any) -> Any:
         return i + 1
@@ -134,29 +140,40 @@ def _with(total: tuple[Any, ...], chain: Chain, share: Any) -> tuple[Any, ...]:
 
 
 @dr.syntax
+def _of_runs(total: tuple[Any, ...], fr: Frame, walk: Listed, rule: Rule, runs: Runs, at: Any, active: Any) -> Any:
+    """The total, as in `_with`, with the runs at some place of lists."""
+    F = walk.table.types.Float
+    i, end = runs.first.bounds(at, active)
+    while active & (i < end):
+        first, last = runs.first.item(i), runs.last.item(i)
+        total = _with(total, chain_wave(fr, walk.table, first, last + 1, walk.k, rule, None, False, active), F(1))
+        i += 1
+    return total
+
+
+@dr.syntax
 def listed_sum(
-    fr: Frame, walk: Listed, rule: Rule, tested: tuple[Sum, Nearest, Margins], receivers: Receivers
+    fr: Frame, walk: Listed, rule: Rule, asked: tuple[Sum, Nearest, Margins], receivers: Receivers
 ) -> tuple[Sum, Nearest, Margins]:
-    """The sum over all that acts on the receivers' blocks; `tested`: what the pieces of the walk make of it."""
+    """The sum over all that acts on the receivers' blocks; `asked`: what the pieces of the walk make of it."""
     found, tab, k = walk.lists, walk.table, walk.k
     F = tab.types.Float
     U = dr.uint32_array_t(F)
-    sums, nearest, margins = tested
+    sums, nearest, margins = asked
     total = (*sums[:5], F(margins.receiver2), F(nearest.distance2), U(nearest.segment))
-    active, block = receivers.active, receivers.block
-    i, end = found.tested.bounds(block, active)
+    active, block, cell = receivers.active, receivers.block, found.cell(receivers)
+    i, end = found.partly.bounds(cell, active)
     while active & (i < end):
         share = F(found.share(i, receivers))
-        known = active & (share > 0) & ~walk.asks(fr, i)
+        piece = found.partly.item(i)
+        known = active & (share > 0)
+        if known & dr.gather(mi.Bool, found.asks, i):
+            known &= ~walk.strong(fr, piece)
         if known:
-            chain = chain_wave(fr, tab, *tab.range(found.tested.item(i)), k, rule, None, False, known)
-            total = _with(total, chain, share)
+            total = _with(total, chain_wave(fr, tab, *tab.range(piece), k, rule, None, False, known), share)
         i += 1
-    i, end = found.first.bounds(block, active)
-    while active & (i < end):
-        first, last = found.first.item(i), found.last.item(i)
-        total = _with(total, chain_wave(fr, tab, first, last + 1, k, rule, None, False, active), F(1))
-        i += 1
+    total = _of_runs(total, fr, walk, rule, found.whole, cell, active)
+    total = _of_runs(total, fr, walk, rule, found.runs, block, active)
     real, imag, err_real, err_imag, rounding2, receiver2, nearest2, nearest_segment = total
     i, end = found.begins.bounds(block, active)
     while active & (i < end):
