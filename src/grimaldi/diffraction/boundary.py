@@ -228,26 +228,21 @@ class _Bodies:
         """By all pieces."""
         fr = frame(self.problem.source, receivers.p, self.tab)
         beside = None if self.grazing is None else near(fr, self.grazing, self.k, receivers)
-        return self._factor(fr, receivers, self._sum(fr, Everywhere(self.tab), self.share, beside, receivers))
+        return self._factor(fr, receivers, self._sum(fr, Everywhere(self.tab, self.share), beside, receivers))
 
     def listed(self, found: Lists, receivers: Receivers) -> Factor:
         """By the lists of the receivers' blocks."""
         receivers = receivers._replace(active=receivers.active & (receivers.block != OUTSIDE))
         fr = frame(self.problem.source, receivers.p, self.tab)
         beside = found.near(receivers, self.grazing)
-        weak = self.tab.device(WEAK_HERE * self.problem.options.tolerance)
-        walk = Listed(found, self.tab, self.k, weak)
-        tested = self._sum(fr, walk, 0.0, beside, receivers)
-        return self._factor(fr, receivers, listed_sum(fr, walk, self.rule, tested, receivers))
+        walk = Listed(found, receivers, self.tab.device(WEAK_HERE * self.problem.options.tolerance))
+        asked = self._sum(fr, walk, beside, receivers)
+        return self._factor(fr, receivers, listed_sum(fr, found, self.tab, self.k, self.rule, asked, receivers))
 
-    def _sum(
-        self, fr: Frame, walk: Walk, share: float, beside: Near | None, receivers: Receivers
-    ) -> tuple[Sum, Nearest, Margins]:
+    def _sum(self, fr: Frame, walk: Walk, beside: Near | None, receivers: Receivers) -> tuple[Sum, Nearest, Margins]:
         options = self.problem.options
         smooth = options.rim == "smooth"
-        return body_sum(
-            fr, self.tab, walk, self.k, self.rule, share, options.tolerance, self.probe, beside, smooth, receivers
-        )
+        return body_sum(fr, self.tab, walk, self.k, self.rule, options.tolerance, self.probe, beside, smooth, receivers)
 
     def _factor(self, fr: Frame, receivers: Receivers, found: tuple[Sum, Nearest, Margins]) -> Factor:
         sums, nearest, margins = found

@@ -229,8 +229,17 @@ class Walk(Protocol):
         """The next place."""
         ...
 
-    def weight(self, fr: Frame, piece: Piece) -> Any:
-        """What a piece's wave counts."""
+    @property
+    def least(self) -> float:
+        """|M| that a chain cut off on a piece leaves, up to which it takes no ray."""
+        ...
+
+    def weight(self, fr: Frame, i: Any, piece: Piece, tested: Any) -> Any:
+        """What the wave of the piece at a place counts, where that takes a ray or not."""
+        ...
+
+    def unasked(self, left: Any) -> Any:
+        """What may be wrong where a piece takes no ray that leaves so much."""
         ...
 
 
@@ -244,6 +253,7 @@ class Everywhere(NamedTuple):
     """All pieces that are near enough to matter, by the table's hierarchy."""
 
     table: Table
+    least: float = 0.0
 
     def bounds(self, receivers: Receivers) -> tuple[Any, Any]:
         U = dr.uint32_array_t(self.table.types.Float)
@@ -263,9 +273,13 @@ class Everywhere(NamedTuple):
     def after(self, i: Any, inside: Any) -> Any:
         return self.table.tree.after(i, inside)
 
-    def weight(self, fr: Frame, piece: Piece) -> Any:
+    def weight(self, fr: Frame, i: Any, piece: Piece, tested: Any) -> Any:
         """By how near the ray it lies."""
         return taper(least_detour(fr, piece.middle, 0) / self.table.far)
+
+    def unasked(self, left: Any) -> Any:
+        """All of it: a piece reaches a receiver or not."""
+        return left
 
 
 def closest(fr: Frame, seg: Segment, ln: Line) -> Any:
@@ -285,7 +299,6 @@ def body_sum(
     walk: Walk,
     k: Any,
     rule: Rule,
-    share: float,
     tolerance: float,
     probe: Rays | None,
     beside: Near | None,
@@ -294,8 +307,8 @@ def body_sum(
 ) -> tuple[Sum, Nearest, Margins]:
     """The sum over the outlines of bodies, piece by piece of a walk, each as far as it reaches the receiver.
 
-    What would add less than `share` of M goes unasked, nothing if that is 0; without a probe all does. Without
-    silhouettes near by a piece reaches the receiver or does not. `smooth` rims are those with a radius.
+    Without a probe none takes a ray. Without silhouettes near by a piece reaches the receiver or does not. `smooth`
+    rims are those with a radius.
     """
     F = tab.types.Float
     U = dr.uint32_array_t(F)
@@ -313,15 +326,13 @@ def body_sum(
         if receivers.active & taken:
             piece = tab.piece(item)
             acts = sounds(fr, piece, n)
-            visible = dr.mask_t(F)(acts)
+            visible, tested = dr.mask_t(F)(acts), dr.mask_t(F)(acts)
             past_real, past_imag = F(0), F(0)
             if dr.hint(probe is not None, mode="scalar"):
                 assert probe is not None
-                tested = dr.mask_t(F)(acts)
-                if dr.hint(share > 0, mode="scalar"):
-                    left = cut_off(fr, piece, k)
-                    tested &= left > share
-                    unasked += dr.select(acts & ~tested, left, 0)
+                left = cut_off(fr, piece, k)
+                tested &= left > walk.least
+                unasked += dr.select(acts & ~tested, walk.unasked(left), 0)
                 if tested:
                     x = mi.Point3f(piece.middle + constant(tab.types.Vector, tab.centre))
                     visible = acts & probe.reaches(x, piece, p, tested)
@@ -334,14 +345,15 @@ def body_sum(
                     if close:
                         past_real, past_imag = grazed(fr, beside.silhouettes, piece, body, visible, k, close)
                 acts = visible | (past_real != 0) | (past_imag != 0)
+            weight = walk.weight(fr, i, piece, tested)
+            acts &= weight > 0
             passed = Passed(visible, past_real, past_imag) if beside is not None else None
             chain = chain_wave(fr, tab, piece.first, piece.end, k, rule, passed, smooth, acts)
-            weight = walk.weight(fr, piece)
             real, imag = dr.fma(weight, chain.wave.real, real), dr.fma(weight, chain.wave.imag, imag)
             err_real, err_imag = err_real + chain.wave.err_real, err_imag + chain.wave.err_imag
             rounding2 += chain.wave.rounding2
             receiver2 = dr.minimum(receiver2, chain.receiver2)
-            closer = visible & (chain.distance2 < nearest2)
+            closer = visible & acts & (chain.distance2 < nearest2)
             nearest2 = dr.select(closer, chain.distance2, nearest2)
             nearest_segment = dr.select(closer, chain.segment, nearest_segment)
         i = walk.after(i, inside)

@@ -137,7 +137,7 @@ def lists(search: Search, blocks: Blocks) -> Lists:
 
 def _in_cells(
     search: Search, pairs: _Pairs, number: int, verdicts: tuple[Any, Any]
-) -> tuple[List, List, Any, Any, Runs]:
+) -> tuple[List, Any, List, Any, Runs]:
     """Those lists of cells of `number` blocks that `Lists` has, by what `_verdicts` says of pairs."""
     tab, cells = search.tab, ACROSS * ACROSS
     pair = places((verdicts[0] | verdicts[1]) != 0)
@@ -161,15 +161,14 @@ def _in_cells(
     dr.eval(along)
     goes_on = (index < len(index) - 1) & dr.gather(mi.Bool, along, dr.minimum(index + 1, len(index) - 1))
     place = cell * dr.opaque(mi.UInt32, number) + dr.gather(mi.UInt32, block, entry)
-    partly = (corners > 0) & ~whole
+    partly = ~asks & (corners > 0) & ~whole
     first, end = tab.range(own)
     places_of = partial(List.of, block=place, blocks=cells * number)
-    some = places(partly)
     return (
         places_of(asks, items=own),
+        dr.gather(mi.UInt32, corners, places(asks)),
         places_of(partly, items=own),
-        dr.gather(mi.UInt32, corners, some),
-        dr.gather(mi.Bool, asks, some),
+        dr.gather(mi.UInt32, corners, places(partly)),
         Runs(places_of(whole & ~along, items=first), places_of(whole & ~goes_on, items=end - 1)),
     )
 

@@ -13,7 +13,7 @@ import drjit as dr
 import mitsuba
 
 from grimaldi.diffraction.corners import corner, leading
-from grimaldi.diffraction.edges import Chain, Margins, Nearest, Sum, chain_wave, cut_off
+from grimaldi.diffraction.edges import Chain, Margins, Nearest, Sum, chain_wave
 from grimaldi.diffraction.frame import Frame
 from grimaldi.diffraction.grazing import Chords, Near
 from grimaldi.diffraction.model import Receivers
@@ -69,9 +69,11 @@ class Lists(NamedTuple):
 
     blocks: Any  # how many
     asked: List  # of cells: pieces that each receiver asks for
-    partly: List  # of cells: pieces that reach it in part, and those asked that may do so without a ray
-    corners: Any  # of each of those a bit for each corner of the cell that it reaches; what lies between in part
-    asks: Any  # of each of those whether it is asked for
+    reach: (
+        Any  # of each of those a bit for each corner of the cell that it reaches, for receivers where it takes no ray
+    )
+    partly: List  # of cells: pieces that reach it in part, what lies between its corners evenly
+    corners: Any  # of each of those the same bits
     whole: Runs  # of cells: those of pieces that reach it, but not all of the block as far as is known
     runs: Runs  # of blocks
     begins: List  # of blocks: segments at whose start a far run begins
@@ -83,14 +85,6 @@ class Lists(NamedTuple):
         """The places of receivers' cells."""
         return receivers.cell * self.blocks + receivers.block
 
-    def share(self, i: Any, receivers: Receivers) -> Any:
-        """How much of a piece reaches receivers, by the corners of their cells: between them it grows evenly."""
-        bits = dr.gather(mi.UInt32, self.corners, i)
-        near, far = (
-            dr.lerp(mi.Float((bits >> row) & 1), mi.Float((bits >> (row + 1)) & 1), receivers.u) for row in (0, 2)
-        )
-        return dr.lerp(near, far, receivers.v)
-
     def near(self, receivers: Receivers, silhouettes: Chords | None) -> Near | None:
         """The bodies beside the receivers' blocks."""
         if self.beside is None or silhouettes is None:
@@ -98,31 +92,37 @@ class Lists(NamedTuple):
         return self.beside.of(receivers.block, receivers.active, silhouettes)
 
 
+def share(corners: Any, i: Any, receivers: Receivers) -> Any:
+    """How much of a piece reaches receivers, by the corners of their cells: between them it grows evenly."""
+    bits = dr.gather(mi.UInt32, corners, i)
+    near, far = (dr.lerp(mi.Float((bits >> row) & 1), mi.Float((bits >> (row + 1)) & 1), receivers.u) for row in (0, 2))
+    return dr.lerp(near, far, receivers.v)
+
+
 class Listed(NamedTuple):
     """The pieces that receivers ask for, as a walk."""
 
     lists: Lists
-    table: Table
-    k: Any
-    weak: Any  # |M| of an end, below which no ray is asked for
+    receivers: Receivers
+    least: Any
 
     def bounds(self, receivers: Receivers) -> tuple[Any, Any]:
         return self.lists.asked.bounds(self.lists.cell(receivers), receivers.active)
 
-    def strong(self, fr: Frame, piece: Any) -> Any:
-        """Whether a piece takes a ray here."""
-        return cut_off(fr, self.table.piece(piece), self.k) >= self.weak
-
     def visit(self, fr: Frame, i: Any) -> tuple[Any, Any, Any]:
-        piece = self.lists.asked.item(i)
-        strong = self.strong(fr, piece)
-        return piece, strong, strong
+        always = dr.mask_t(fr.z2)(True)
+        return self.lists.asked.item(i), always, always
 
     def after(self, i: Any, inside: Any) -> Any:
         return i + 1
 
-    def weight(self, fr: Frame, piece: Piece) -> Any:
-        return type(fr.z2)(1)
+    def weight(self, fr: Frame, i: Any, piece: Piece, tested: Any) -> Any:
+        """Without a ray by the corners of the cell."""
+        return dr.select(tested, 1, type(fr.z2)(share(self.lists.reach, i, self.receivers)))
+
+    def unasked(self, left: Any) -> Any:
+        """Nothing: that such pieces grow evenly is part of the tolerance."""
+        return type(left)(0)
 
 
 def _with(total: tuple[Any, ...], chain: Chain, share: Any) -> tuple[Any, ...]:
@@ -140,23 +140,30 @@ def _with(total: tuple[Any, ...], chain: Chain, share: Any) -> tuple[Any, ...]:
 
 
 @dr.syntax
-def _of_runs(total: tuple[Any, ...], fr: Frame, walk: Listed, rule: Rule, runs: Runs, at: Any, active: Any) -> Any:
+def _of_runs(
+    total: tuple[Any, ...], fr: Frame, tab: Table, k: Any, rule: Rule, runs: Runs, at: Any, active: Any
+) -> Any:
     """The total, as in `_with`, with the runs at some place of lists."""
-    F = walk.table.types.Float
+    F = tab.types.Float
     i, end = runs.first.bounds(at, active)
     while active & (i < end):
         first, last = runs.first.item(i), runs.last.item(i)
-        total = _with(total, chain_wave(fr, walk.table, first, last + 1, walk.k, rule, None, False, active), F(1))
+        total = _with(total, chain_wave(fr, tab, first, last + 1, k, rule, None, False, active), F(1))
         i += 1
     return total
 
 
 @dr.syntax
 def listed_sum(
-    fr: Frame, walk: Listed, rule: Rule, asked: tuple[Sum, Nearest, Margins], receivers: Receivers
+    fr: Frame,
+    found: Lists,
+    tab: Table,
+    k: Any,
+    rule: Rule,
+    asked: tuple[Sum, Nearest, Margins],
+    receivers: Receivers,
 ) -> tuple[Sum, Nearest, Margins]:
-    """The sum over all that acts on the receivers' blocks; `asked`: what the pieces of the walk make of it."""
-    found, tab, k = walk.lists, walk.table, walk.k
+    """The sum over all that acts on the receivers' blocks; `asked`: what the pieces that `Listed` walks make of it."""
     F = tab.types.Float
     U = dr.uint32_array_t(F)
     sums, nearest, margins = asked
@@ -164,16 +171,14 @@ def listed_sum(
     active, block, cell = receivers.active, receivers.block, found.cell(receivers)
     i, end = found.partly.bounds(cell, active)
     while active & (i < end):
-        share = F(found.share(i, receivers))
-        piece = found.partly.item(i)
-        known = active & (share > 0)
-        if known & dr.gather(mi.Bool, found.asks, i):
-            known &= ~walk.strong(fr, piece)
-        if known:
-            total = _with(total, chain_wave(fr, tab, *tab.range(piece), k, rule, None, False, known), share)
+        weight = F(share(found.corners, i, receivers))
+        reached = active & (weight > 0)
+        if reached:
+            piece = tab.range(found.partly.item(i))
+            total = _with(total, chain_wave(fr, tab, *piece, k, rule, None, False, reached), weight)
         i += 1
-    total = _of_runs(total, fr, walk, rule, found.whole, cell, active)
-    total = _of_runs(total, fr, walk, rule, found.runs, block, active)
+    total = _of_runs(total, fr, tab, k, rule, found.whole, cell, active)
+    total = _of_runs(total, fr, tab, k, rule, found.runs, block, active)
     real, imag, err_real, err_imag, rounding2, receiver2, nearest2, nearest_segment = total
     i, end = found.begins.bounds(block, active)
     while active & (i < end):

@@ -147,7 +147,7 @@ def _sample(shot: Shot, pixel: Any, sample: Any) -> tuple[Stream, Any]:
 class Samples(NamedTuple):
     """M at all samples of some pixels of a tile."""
 
-    rank: Any  # of a pixel among them, OUTSIDE if it is none of them
+    rank: Any  # of a pixel among them, OUTSIDE if it is none of them; None if these are all that are traced
     there: Any  # whether a sample saw a lit surface: beside an edge, rounding decides, and a second look may differ
     real: Any
     imag: Any
@@ -155,6 +155,9 @@ class Samples(NamedTuple):
 
     def at(self, pixel: Any, index: Any, spp: int, active: Any) -> Known:
         """M at samples of the tile's pixels."""
+        if self.rank is None:
+            real, imag, error = self[2:]
+            return Known(real, imag, error, active & self.there)
         rank = dr.gather(mi.UInt32, self.rank, pixel, active)
         holds = active & (rank != OUTSIDE)
         place = rank * dr.opaque(mi.UInt32, spp) + (index - pixel * dr.opaque(mi.UInt32, spp))
@@ -221,8 +224,22 @@ def render_tile(light: Light, sensor: Any, shot: Shot, first: int, pixels: int, 
     traced = begin(index, asks=False)  # M is known wherever the sources' light is asked for, but for few samples
     left: Any = dr.compress(~traced.finite)
     if len(left):
+        asked = [_at(light, ask, sensor, shot, first, left) for ask in band.asks]
+        traced.put(_traced(light, sensor, shot, first, band.cells, asked, left, asks=False), left)
+        left = dr.compress(~traced.finite)
+    if len(left):  # that see another surface now: beside an edge rounding decides
         traced.put(begin(left, asks=True), left)
     return _means(traced, shot, first)
+
+
+def _at(light: Light, ask: Ask, sensor: Any, shot: Shot, first: int, index: Any) -> Samples:
+    """M at samples of a tile, a few and in any place."""
+    spp = dr.opaque(mi.UInt32, shot.spp)
+    _, film = _sample(shot, dr.opaque(mi.UInt32, first) + index // spp, index % spp)
+    (_, receivers, _), _ = sight(light, sensor, shot, film.x, film.y)
+    dr.eval(film, *receivers[:3])
+    m = ask(film.x, film.y, receivers)
+    return Samples(None, receivers.active, *(mi.Float64(value) for value in m[:3]))
 
 
 def _traced(
