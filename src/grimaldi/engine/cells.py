@@ -528,25 +528,27 @@ def _by_cubics(nodes: _Nodes, grid: _Grid, x: Any, y: Any, size: int, light: Any
     return (off <= allowed) & (off * (light + off) <= BY_CUBICS[size > 1] * missed), off
 
 
+@dr.syntax
 def _told(values: Any, grid: _Grid, x: Any, y: Any, size: Any, cubic: Any, u: Any, v: Any, active: Any) -> Any:
     """What nodes say at places (u, v), 0..1, of cells at pixels (x, y), and the range of their distances."""
     steps = grid.steps(size)
     first = grid.node(x, y, size, 0, 0)
-    ways = []
-    for t, step in zip((u, v), steps, strict=True):
-        second, of_cubic = weights(t)
-        first = first - dr.select(cubic & ~second, step, 0)
-        own = (*_quadratic(t), mi.Float(0))
-        ways.append(
-            [
-                (dr.select(cubic, a, b), m * step if m < 3 else dr.select(cubic, 3 * step, 0))
-                for m, (a, b) in enumerate(zip(of_cubic, own, strict=True))
-            ]
-        )
     found, low, high = mi.Array4f(0), mi.Float(dr.inf), mi.Float(0)
-    for b, down in ways[1]:
-        for a, across in ways[0]:
-            value = dr.gather(mi.Array4f, values, first + (down + across), active)
+    if active & cubic:
+        (left_out, of_u), (top_out, of_v) = weights(u), weights(v)
+        corner = first - dr.select(left_out, 0, steps[0]) - dr.select(top_out, 0, steps[1])
+        found, low, high = _weighted(values, corner, steps, of_u, of_v)
+    if active & ~cubic:
+        found, low, high = _weighted(values, first, steps, _quadratic(u), _quadratic(v))
+    return found, high - low
+
+
+def _weighted(values: Any, first: Any, steps: tuple[Any, Any], across: Any, down: Any) -> tuple[Any, Any, Any]:
+    """Nodes from the first on by weights of their columns and rows, summed; their least and largest distance."""
+    found, low, high = mi.Array4f(0), mi.Float(dr.inf), mi.Float(0)
+    for n, b in enumerate(down):
+        for m, a in enumerate(across):
+            value = dr.gather(mi.Array4f, values, first + (n * steps[1] + m * steps[0]))
             found = dr.fma(mi.Array4f(a * b), value, found)
             low, high = dr.minimum(low, value.z), dr.maximum(high, value.z)
-    return found, high - low
+    return found, low, high
