@@ -15,7 +15,9 @@ from numpy.typing import NDArray
 from optics import factor, line, mesh
 
 import grimaldi
+import grimaldi.outlines.soup as of_soup
 from grimaldi.errors import InputError
+from grimaldi.outlines import hidden
 from grimaldi.outlines.chains import chains
 from grimaldi.outlines.extract import edges_of, outline, sight_of, soup_of
 from grimaldi.outlines.merging import runs
@@ -215,6 +217,21 @@ def test_bodies_in_one_mesh_or_in_many_have_the_same_outlines(source):
     assert lengths[0] == pytest.approx(lengths[1], rel=1e-12)
     whole = silhouettes(many, source)
     assert lengths[0] < 0.9 * np.linalg.norm(whole.end - whole.start, axis=1).sum()
+
+
+@SOURCES
+def test_an_outline_does_not_depend_on_the_parts_that_it_is_found_in(source, monkeypatch):
+    """Parts of whole bodies for what meets at a point, of any triangles for what is before what."""
+
+    def found() -> Reals:
+        o = outline(crowd(6), source)
+        return np.sort(np.column_stack([o.start, o.end, o.behind, o.body]), axis=0)
+
+    whole = found()
+    for module in (of_soup, hidden):
+        monkeypatch.setattr(module, "PART", 16)
+    assert len(whole) > 100
+    np.testing.assert_array_equal(found(), whole)
 
 
 def in_float32(shape: Mesh, turn: Reals, at: Reals) -> Mesh:
