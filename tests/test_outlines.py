@@ -223,7 +223,7 @@ def test_bodies_in_one_mesh_or_in_many_have_the_same_outlines(source):
 def test_an_outline_does_not_depend_on_the_parts_that_it_is_found_in(source, monkeypatch):
     """Parts of whole bodies for what meets at a point, of any triangles for what is before what."""
 
-    def found() -> Reals:
+    def found() -> Any:
         o = outline(crowd(6), source)
         return np.sort(np.column_stack([o.start, o.end, o.behind, o.body]), axis=0)
 
