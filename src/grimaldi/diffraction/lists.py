@@ -69,9 +69,7 @@ class Lists(NamedTuple):
 
     blocks: Any  # how many
     asked: List  # of cells: pieces that each receiver asks for
-    reach: (
-        Any  # of each of those a bit for each corner of the cell that it reaches, for receivers where it takes no ray
-    )
+    reach: Any  # of each of those a bit for each corner of the cell that it reaches: what counts where it takes no ray
     partly: List  # of cells: pieces that reach it in part, what lies between its corners evenly
     corners: Any  # of each of those the same bits
     whole: Runs  # of cells: those of pieces that reach it, but not all of the block as far as is known
