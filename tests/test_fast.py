@@ -25,8 +25,10 @@ from grimaldi.diffraction.reach import reach
 from grimaldi.diffraction.segment import Corners, Rule, line, segment_wave
 from grimaldi.engine.asking import ask
 from grimaldi.engine.blocks import Sight, Squares, squares
-from grimaldi.engine.cells import LARGEST, ROWS, Nodes, Shares, cells
+from grimaldi.engine.cells import cells
 from grimaldi.engine.frozen import frozen
+from grimaldi.engine.judging import Shares
+from grimaldi.engine.nodes import LARGEST, ROWS, Nodes
 from grimaldi.engine.tiles import Samples, Shot, sight
 from grimaldi.light import Settings, prepare
 

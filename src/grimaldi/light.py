@@ -20,8 +20,8 @@ from grimaldi.diffraction.boundary import boundary
 from grimaldi.diffraction.frame import toward
 from grimaldi.diffraction.model import Evaluate, Factor, Options, Receivers
 from grimaldi.diffraction.none import none
-from grimaldi.engine.cells import Shares
 from grimaldi.engine.hits import Hits, hits
+from grimaldi.engine.judging import Shares
 from grimaldi.errors import InputError
 from grimaldi.options import checked_options
 from grimaldi.propagate import Wave, carrier, factor

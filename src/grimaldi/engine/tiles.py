@@ -19,7 +19,8 @@ from numpy.typing import NDArray
 from grimaldi.diffraction.model import OUTSIDE, Factor, Grouped, Receivers
 from grimaldi.engine.asking import Ask, ask
 from grimaldi.engine.blocks import Sight, squares
-from grimaldi.engine.cells import LARGEST, ROWS, Cells, Known, Nodes, cells
+from grimaldi.engine.cells import Cells, Known, cells
+from grimaldi.engine.nodes import LARGEST, ROWS, Nodes
 from grimaldi.light import Light, Reflected
 from grimaldi.tracing import trace
 
