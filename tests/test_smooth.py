@@ -252,6 +252,7 @@ def test_camera_rays_and_outlines_have_one_geometry(tmp_path):
     assert len(body.geometry.faces) == 80 * 16
     assert [s.id() for s in scene.mitsuba.shapes()] == [s.id() for s in coarse.mitsuba.shapes()]
     assert {s.face_count() for s in (*scene.mitsuba.shapes(), *scene.blockers.shapes())} == {80 * 16}
+    assert {len(surface.faces) for surface in scene.surfaces if isinstance(surface, Mesh)} == {80 * 16}
     seen = scene.mitsuba.shapes()[body.shape]
     np.testing.assert_array_equal(np.array(seen.vertex_positions_buffer()).reshape(-1, 3), body.geometry.vertices)
     assert seen.bsdf().class_name() == "TwoSidedBRDF"
