@@ -99,9 +99,7 @@ def lists(search: Search, blocks: Blocks) -> Lists:
     dr.eval(tested, kept, dropped)
 
     # runs of neighbours
-    last = len(pairs.index) - 1
-    at = dr.arange(mi.UInt32, last + 1)
-    before, after = dr.maximum(at, 1) - 1, dr.minimum(at + 1, last)
+    before = dr.maximum(dr.arange(mi.UInt32, len(pairs.index)), 1) - 1
     follows = dr.gather(mi.Bool, tab.follows, pairs.piece) & (
         dr.gather(mi.UInt32, pairs.index, before) + 1 == pairs.index
     )
@@ -109,8 +107,8 @@ def lists(search: Search, blocks: Blocks) -> Lists:
     joint = follows & dropped & dr.gather(mi.Bool, dropped, before) & (dr.abs(turn) < CORNER * limit)
     along = follows & kept & dr.gather(mi.Bool, kept, before)
     dr.eval(joint, along)
-    goes_on = (at < last) & dr.gather(mi.Bool, along, after)
-    begins, stops = dropped & ~joint, dropped & ~((at < last) & dr.gather(mi.Bool, joint, after))
+    goes_on = _of_next(along)
+    begins, stops = dropped & ~joint, dropped & ~_of_next(joint)
     strong = dr.abs(seen.start) >= CORNER * limit, dr.abs(seen.stop) >= CORNER * limit
     left2 = dr.select(dropped, seen.inner2, 0) + dr.select(joint, dr.square(turn), 0)
     left2 += dr.select(begins & ~strong[0], dr.square(seen.start), 0)
@@ -135,6 +133,12 @@ def lists(search: Search, blocks: Blocks) -> Lists:
     )
 
 
+def _of_next(flags: Any) -> Any:
+    """The flag of the next one, evaluated before; False for the last."""
+    at, last = dr.arange(mi.UInt32, len(flags)), len(flags) - 1
+    return (at < last) & dr.gather(mi.Bool, flags, dr.minimum(at + 1, last))
+
+
 def _in_cells(
     search: Search, pairs: _Pairs, number: int, verdicts: tuple[Any, Any]
 ) -> tuple[List, Any, List, Any, Runs]:
@@ -152,14 +156,14 @@ def _in_cells(
     asks = ((dr.gather(mi.UInt32, asked, entry) >> cell) & 1) != 0
     whole = ~asks & (corners == 15)
     own = dr.gather(mi.UInt32, piece, entry)
-    before = dr.maximum(index, 1) - 1
     dr.eval(corners, asks, whole)
+    before = dr.maximum(entry, 1) - 1  # in the same cell
     follows = dr.gather(mi.Bool, tab.follows, own) & (entry > 0)
-    follows &= (dr.gather(mi.UInt32, piece, before - cell * count) + 1 == own) & dr.gather(mi.Bool, whole, before)
-    follows &= dr.gather(mi.UInt32, block, before - cell * count) == dr.gather(mi.UInt32, block, entry)
-    along = whole & follows
+    follows &= dr.gather(mi.UInt32, piece, before) + 1 == own
+    follows &= dr.gather(mi.UInt32, block, before) == dr.gather(mi.UInt32, block, entry)
+    along = whole & follows & dr.gather(mi.Bool, whole, cell * count + before)
     dr.eval(along)
-    goes_on = (index < len(index) - 1) & dr.gather(mi.Bool, along, dr.minimum(index + 1, len(index) - 1))
+    goes_on = _of_next(along)
     place = cell * dr.opaque(mi.UInt32, number) + dr.gather(mi.UInt32, block, entry)
     partly = ~asks & (corners > 0) & ~whole
     first, end = tab.range(own)
