@@ -17,7 +17,6 @@ from optics import factor, line, mesh
 import grimaldi
 import grimaldi.outlines.soup as of_soup
 from grimaldi.errors import InputError
-from grimaldi.outlines import hidden
 from grimaldi.outlines.chains import chains
 from grimaldi.outlines.extract import edges_of, outline, sight_of, soup_of
 from grimaldi.outlines.merging import runs
@@ -228,8 +227,7 @@ def test_an_outline_does_not_depend_on_the_parts_that_it_is_found_in(source, mon
         return np.sort(np.column_stack([o.start, o.end, o.behind, o.body]), axis=0)
 
     whole = found()
-    for module in (of_soup, hidden):
-        monkeypatch.setattr(module, "PART", 16)
+    monkeypatch.setattr(of_soup, "PART", 16)
     assert len(whole) > 100
     np.testing.assert_array_equal(found(), whole)
 

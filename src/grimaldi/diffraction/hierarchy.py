@@ -74,7 +74,8 @@ def layout(centre: NDArray[np.float64], radius: NDArray[np.float64], group: NDAr
     n = len(centre)
     _, of = np.unique(group, return_inverse=True)
     place = morton(np.stack([np.bincount(of, x) for x in centre.T], axis=1) / np.bincount(of)[:, None])
-    order = np.argsort(np.argsort(np.argsort(place, kind="stable"))[of], kind="stable")
+    rank = np.argsort(np.argsort(place, kind="stable"))
+    order = np.argsort(rank[of], kind="stable")
     centre, radius = centre[order], radius[order]
     blocks = _blocks(n)
     total = n + sum(-(-n // b) for b in blocks)

@@ -90,10 +90,13 @@ def hits(scene: Scene) -> Hits:
         if isinstance(surface, (Mesh, Disk)):
             shapes[i] = FLAT, faces, isinstance(surface, Mesh), reach
             flat.append(surface if isinstance(surface, Mesh) else _triangle(surface))
-            own = surface.begin if isinstance(surface, Joined) else np.zeros(1, int)
-            number = np.repeat(count + np.arange(len(own) - 1), np.diff(own))
-            parts.append(number if len(number) else np.zeros(len(flat[-1].faces), int))
-            faces, count = faces + len(flat[-1].faces), count + len(own) - 1
+            faces += len(flat[-1].faces)
+            if isinstance(surface, Joined):
+                of_each = np.diff(surface.begin)
+                parts.append(count + np.repeat(np.arange(len(of_each)), of_each))
+                count += len(of_each)
+            else:
+                parts.append(np.zeros(len(flat[-1].faces), int))
         else:
             shapes[i] = CURVED, len(quadrics), 0, reach
             quadrics.append(_quadric(surface))

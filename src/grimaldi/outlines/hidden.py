@@ -17,7 +17,6 @@ from grimaldi.scene.bodies import vertices
 from grimaldi.scene.model import Body, Cylinder, Disk, Mesh, Source, Sphere
 
 TOUCHING = 1e-9  # of the way to the source (of the edges' extent for a plane wave): no nearer blocker counts
-PART = 1 << 15  # triangles at once
 PAIRS = 1 << 14  # of a point and what may hide it at once: what fits the cache
 
 
@@ -115,15 +114,15 @@ def _triangles(soup: Soup, view: View, edges: Candidates, pieces: Pieces) -> lis
     """Pairs (piece, triangle) that overlap in view, in parts."""
     seen = view(soup.points)
 
-    def pairs(begin: int) -> tuple[Integers, Integers]:
-        corners = [seen.take(c, axis=1) for c in soup.corners[:, begin : begin + PART]]
+    def pairs(part: slice) -> tuple[Integers, Integers]:
+        corners = [seen.take(c, axis=1) for c in soup.corners[:, part]]
         triangle, piece = pieces.index.overlapping(*view.boxes(*corners))
-        edge, number = pieces.edge[piece], begin + triangle
+        edge, number = pieces.edge[piece], part.start + triangle
         beside = (edges.faces[edge, 0] == number) | (edges.faces[edge, 1] == number)
         kept = ~beside & pieces.may_be_met(piece, [c.take(triangle, axis=1) for c in corners])
         return piece[kept], number[kept]
 
-    return by_threads(pairs, range(0, len(soup), PART))
+    return by_threads(pairs, soup.parts())
 
 
 def _shapes(bodies: Sequence[Body], offset: int, view: View, pieces: Pieces) -> tuple[Integers, Integers]:

@@ -7,8 +7,7 @@ matters. Each triangle's side is decided once: the edges of a closed mesh form c
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,10 +18,6 @@ from grimaldi.outlines.soup import Soup, by_threads
 from grimaldi.scene.model import Source
 from grimaldi.scene.triangles import areas
 
-PART = 1 << 15  # triangles at once: what fits the cache
-
-T = TypeVar("T")
-
 
 def sides(soup: Soup, source: Source) -> NDArray[np.int8]:
     """±1: whether triangles (m,) turn counter-clockwise along the rays of the source; 0 if their body stops no ray.
@@ -32,8 +27,7 @@ def sides(soup: Soup, source: Source) -> NDArray[np.int8]:
     triangles are edge-on, a sheet in the plane of its rays, stops none.
     """
     side, level = np.empty(len(soup), np.int8), np.empty(len(soup), bool)
-    for first in range(0, len(soup), PART):
-        part = slice(first, first + PART)
+    for part in soup.parts():
         a, area = _areas(soup, part)
         if source.position is not None:
             w = [s - x for s, x in zip(source.position, a, strict=True)]
@@ -52,11 +46,6 @@ def sides(soup: Soup, source: Source) -> NDArray[np.int8]:
         standing[soup.body[~level]] = True
         side[~standing[soup.body]] = 0
     return side
-
-
-def _of_parts(soup: Soup, find: Callable[[slice], T]) -> list[T]:
-    """What there is to find in each part of the triangles."""
-    return by_threads(find, (slice(first, first + PART) for first in range(0, len(soup), PART)))
 
 
 def _areas(soup: Soup, which: slice | Integers) -> tuple[Reals, Reals]:
@@ -92,7 +81,7 @@ def silhouettes(soup: Soup, source: Source) -> tuple[Candidates, Integers]:
         for way, sign in enumerate((1, -1)):
             turned[way, soup.corners[:, part][:, side[part] == sign].ravel()] = True
 
-    _of_parts(soup, mark)
+    by_threads(mark, soup.parts())
     marked = (turned[0] & turned[1]) | soup.at_border
 
     def some(part: slice) -> tuple[Integers, Integers]:
@@ -101,7 +90,9 @@ def silhouettes(soup: Soup, source: Source) -> tuple[Candidates, Integers]:
         return part.start + face, corner
 
     none = np.empty(0, np.int64)
-    face, corner = (np.concatenate([none, *parts]) for parts in zip((none, none), *_of_parts(soup, some), strict=True))
+    face, corner = (
+        np.concatenate([none, *parts]) for parts in zip((none, none), *by_threads(some, soup.parts()), strict=True)
+    )
     tail, head = soup.corners[corner, face], soup.corners[(corner + 1) % 3, face]
 
     forward = tail < head

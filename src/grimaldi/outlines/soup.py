@@ -16,7 +16,7 @@ from grimaldi.outlines.model import Integers, Reals
 from grimaldi.scene.model import Geometry, Mesh
 from grimaldi.scene.triangles import merged_points
 
-PART = 1 << 15  # items of bodies at once: what fits the cache
+PART = 1 << 15  # triangles, or points, at once: what fits the cache
 
 S = TypeVar("S")
 T = TypeVar("T")
@@ -55,6 +55,10 @@ class Soup:
 
     def __len__(self) -> int:
         return self.corners.shape[1]
+
+    def parts(self) -> Iterator[slice]:
+        """All triangles, so many at once as fit the cache."""
+        return (slice(first, first + PART) for first in range(0, len(self), PART))
 
     def triangles(self, which: Integers) -> Reals:
         """Corners (3 coordinates, 3 corners, k) of some triangles."""
