@@ -1,4 +1,4 @@
-"""The film cut into squares: what the camera sees in each is a block of receivers, or two of different surfaces."""
+"""The film cut into squares: what the camera sees in each is a block of receivers, or a few of different surfaces."""
 
 from __future__ import annotations
 
@@ -19,6 +19,7 @@ Reals = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 SIDE = 16  # pixels
+MOST = 3  # blocks of a square
 ROOM = 1.5  # times what the samples of a curved surface differ by
 DEEPEST = 4.0  # times the distance of a sample, that its plane may be seen at within a square
 PLANE = 1e-4  # what a point may lie off a plane, of the block's radius; and a normal off another
@@ -37,10 +38,10 @@ class Sight(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Squares:
-    """Blocks for some rows of a film, `across` squares in a row; `second`: the second block of each square."""
+    """Blocks for some rows of a film, `across` squares in a row; `further`: the second, … block of each square."""
 
     blocks: Blocks
-    second: Any
+    further: tuple[Any, ...]
     across: Any
     down: Any
     top: Any
@@ -51,9 +52,10 @@ class Squares:
         x = dr.minimum(mi.UInt32(u), self.across * ACROSS - 1)
         y = dr.minimum(mi.UInt32(v), self.down * ACROSS - 1)
         square = (y // ACROSS) * self.across + x // ACROSS
-        first = self.blocks.of(receivers, square)
-        second = self.blocks.of(receivers, dr.gather(mi.UInt32, self.second, square))
-        block = dr.select(first == OUTSIDE, second, first)
+        block = self.blocks.of(receivers, square)
+        for index in self.further:
+            other = self.blocks.of(receivers, dr.gather(mi.UInt32, index, square))
+            block = dr.select(block == OUTSIDE, other, block)
         cell = (y % ACROSS) * ACROSS + x % ACROSS
         return receivers._replace(block=block, cell=cell, u=u - mi.Float(x), v=v - mi.Float(y))
 
@@ -98,17 +100,21 @@ def squares(see: Callable[[Any, Any], Sight], width: int, top: int, rows: int) -
     """The blocks of `rows` rows of a film `width` pixels wide, from row `top` on."""
     across, down = -(-width // SIDE), -(-rows // SIDE)
     nodes = _nodes(see, across, down, top)
-    first = _group(nodes, np.where(nodes.lit[:, MIDDLE], MIDDLE, nodes.lit.argmax(1)), nodes.lit)
-    left = nodes.lit & ~first.member
-    having = np.flatnonzero(left.any(1))
-    second = _group(nodes.of(having), left[having].argmax(1), left[having])
-    index = np.full(across * down, OUTSIDE, np.uint32)
-    index[having] = across * down + np.arange(len(having))
-    both = first.and_those_of(second)
-    square = np.append(np.arange(across * down), having)
+    groups = _group(nodes, np.where(nodes.lit[:, MIDDLE], MIDDLE, nodes.lit.argmax(1)), nodes.lit)
+    square = np.arange(across * down)
+    left = nodes.lit & ~groups.member
+    further: list[Integers] = []
+    for _ in range(1, MOST):
+        having = np.flatnonzero(left.any(1))
+        more = _group(nodes.of(having), left[having].argmax(1), left[having])
+        index = np.full(across * down, OUTSIDE)
+        index[having] = len(square) + np.arange(len(having))
+        left[having] &= ~more.member
+        groups, square = groups.and_those_of(more), np.append(square, having)
+        further.append(index)
     return Squares(
-        _blocks(both, _beside(both, square, index, across, down)),
-        mi.UInt32(index),
+        _blocks(groups, _beside(groups, square, further, across, down)),
+        tuple(mi.UInt32(index.astype(np.uint32)) for index in further),
         dr.opaque(mi.UInt32, across),
         dr.opaque(mi.UInt32, down),
         dr.opaque(mi.Float, top),
@@ -164,7 +170,7 @@ def _group(nodes: _Nodes, seed: Integers, candidates: NDArray[np.bool_]) -> _Gro
     )
 
 
-def _beside(group: _Group, square: Integers, second: NDArray[np.uint32], across: int, down: int) -> list[Integers]:
+def _beside(group: _Group, square: Integers, further: list[Integers], across: int, down: int) -> list[Integers]:
     """For each block the blocks around it that lie in the same plane, itself where none does."""
     flat = group.there & (group.bend == 0)
     own = np.arange(len(square))
@@ -175,7 +181,7 @@ def _beside(group: _Group, square: Integers, second: NDArray[np.uint32], across:
             there = (x + dx >= 0) & (x + dx < across) & (y + dy >= 0) & (y + dy < down)
             beside = np.where(there, square + dy * across + dx, square)
             best = own.copy()
-            for other in (beside, np.where(second[beside] == OUTSIDE, beside, second[beside]).astype(np.int64)):
+            for other in (beside, *(np.where(index[beside] == OUTSIDE, beside, index[beside]) for index in further)):
                 off = np.abs(((group.p[other] - group.p) * group.n).sum(1))
                 same = flat & flat[other] & ((group.n[other] * group.n).sum(1) > 1 - PLANE**2)
                 best = np.where(same & there & (off <= 4 * PLANE * group.radius), other, best)
