@@ -84,23 +84,10 @@ def slopes(ray: Any, a: Corner, b: Corner, k: Any) -> Slopes:
 
 def between(ray: Any, a: Corner, b: Corner, k: Any, rule: Corners) -> Ends:
     """∫ C e^{ikΔ} dφ from corner a to b, about a ray of that direction."""
-    length2, turn, slope_a, slope_b = slopes(ray, a, b, k)
-    bend = slope_b - slope_a
-
-    # short: Δφ = atan(turn / a·b), shared out so that dφ/dt is in the ratio of 1/d²
-    x = turn * dr.rcp(dr.dot(a.q, b.q))
-    x2 = x * x
-    phi = x * (1 - x2 * (1 / 3 - x2 / 5))
-    share = 2 * phi * dr.rcp(a.d2 + b.d2)
-    delta = 0.5 * (slope_a + slope_b)
-    re, im = _filon(delta, dr.fma(a.cos, b.cos, a.sin * b.sin), dr.fma(b.sin, a.cos, -b.cos * a.sin))
-    # -i bend/2 ∫ x(1-x) e^{iδx} dx, about the middle of the phases
-    bent = bend * dr.rcp(24 * dr.square(dr.fma(delta, delta * (1 / 40), 1)))
-    im_a, im_b = im - bent, -im - bent
-    near_a, near_b = share * b.d2 * a.C, share * a.d2 * b.C
-    short_real = near_a * (re * a.cos - im_a * a.sin) + near_b * (re * b.cos - im_b * b.sin)
-    short_imag = near_a * (re * a.sin + im_a * a.cos) + near_b * (re * b.sin + im_b * b.cos)
-    is_short = (dr.abs(bend) < rule.bend) & (length2 < rule.near2 * dr.minimum(a.d2, b.d2))
+    at = slopes(ray, a, b, k)
+    length2, turn, slope_a, slope_b = at
+    short_real, short_imag = short(a, b, at)
+    serves = is_short(a, b, at, rule)
 
     # far: i C φ'/ψ' e^{iψ} at a, less the same at b
     end_a = turn * a.C * dr.rcp(a.d2 * slope_a)
@@ -108,10 +95,34 @@ def between(ray: Any, a: Corner, b: Corner, k: Any, rule: Corners) -> Ends:
     least = 2 * rule.far * k * length2
     is_far = (slope_a * slope_b > 0) & (dr.square(slope_a) > least * a.inv) & (dr.square(slope_b) > least * b.inv)
     return Ends(
-        dr.select(is_short, short_real, end_b * b.sin - end_a * a.sin),
-        dr.select(is_short, short_imag, end_a * a.cos - end_b * b.cos),
-        is_short | is_far,
+        dr.select(serves, short_real, end_b * b.sin - end_a * a.sin),
+        dr.select(serves, short_imag, end_a * a.cos - end_b * b.cos),
+        serves | is_far,
         turn,
+    )
+
+
+def is_short(a: Corner, b: Corner, at: Slopes, rule: Corners) -> Any:
+    """Whether `short` serves."""
+    return (dr.abs(at.b - at.a) < rule.bend) & (at.length2 < rule.near2 * dr.minimum(a.d2, b.d2))
+
+
+def short(a: Corner, b: Corner, at: Slopes) -> tuple[Any, Any]:
+    """∫ C e^{ikΔ} dφ along a short segment, real and imaginary part."""
+    # Δφ = atan(turn / a·b), shared out so that dφ/dt is in the ratio of 1/d²
+    x = at.turn * dr.rcp(dr.dot(a.q, b.q))
+    x2 = x * x
+    phi = x * (1 - x2 * (1 / 3 - x2 / 5))
+    share = 2 * phi * dr.rcp(a.d2 + b.d2)
+    delta = 0.5 * (at.a + at.b)
+    re, im = _filon(delta, dr.fma(a.cos, b.cos, a.sin * b.sin), dr.fma(b.sin, a.cos, -b.cos * a.sin))
+    # -i bend/2 ∫ x(1-x) e^{iδx} dx, about the middle of the phases
+    bent = (at.b - at.a) * dr.rcp(24 * dr.square(dr.fma(delta, delta * (1 / 40), 1)))
+    im_a, im_b = im - bent, -im - bent
+    near_a, near_b = share * b.d2 * a.C, share * a.d2 * b.C
+    return (
+        near_a * (re * a.cos - im_a * a.sin) + near_b * (re * b.cos - im_b * b.sin),
+        near_a * (re * a.sin + im_a * a.cos) + near_b * (re * b.sin + im_b * b.cos),
     )
 
 

@@ -13,7 +13,7 @@ import drjit as dr
 import mitsuba
 import numpy as np
 
-from grimaldi.diffraction.corners import Corner, corner, slopes
+from grimaldi.diffraction.corners import Corner, corner, is_short, short, slopes
 from grimaldi.diffraction.edges import cut_off, sounds
 from grimaldi.diffraction.frame import Frame, constant, frame
 from grimaldi.diffraction.grazing import Chords, Near, near, other_than, worth
@@ -34,6 +34,8 @@ FINE = 1 << 16  # parts of its square, in which it is counted: sums of whole num
 WEAK = 0.3  # of the tolerance: |M| of an end that grows evenly between corners of cells which it reaches or not
 REMOTE = 1.5  # radii of a block, that such a piece is away from it at least
 ALL = (1 << ACROSS * ACROSS) - 1  # cells
+BENT = 2.0  # times what a short segment may bend by, that a chord may where it tells what its segments do
+STRAIGHT = 0.01  # of the tolerance: what M may change by where a piece's chord stands for its segments
 UNTESTED = 0.1  # of the tolerance: |M| of an end that reaches a block or not as a whole, by what its middle says
 
 
@@ -68,6 +70,7 @@ class _Seen(NamedTuple):
     open: Any  # whether it acts there
     weak: Any  # whether a chain cut off on it leaves little everywhere in the block
     far: Any  # whether leading terms serve everywhere in the block
+    straight: Any  # whether its chord tells its wave everywhere in the block
     inner2: Any  # sum of squares of what its inner corners send
     start: Any  # C φ'/ψ' at its ends
     stop: Any
@@ -105,9 +108,7 @@ def lists(search: Search, blocks: Blocks) -> Lists:
     )
     turn = seen.start - dr.gather(mi.Float, seen.stop, before)
     joint = follows & dropped & dr.gather(mi.Bool, dropped, before) & (dr.abs(turn) < CORNER * limit)
-    along = follows & kept & dr.gather(mi.Bool, kept, before)
-    dr.eval(joint, along)
-    goes_on = _of_next(along)
+    dr.eval(joint, follows)
     begins, stops = dropped & ~joint, dropped & ~_of_next(joint)
     strong = dr.abs(seen.start) >= CORNER * limit, dr.abs(seen.stop) >= CORNER * limit
     left2 = dr.select(dropped, seen.inner2, 0) + dr.select(joint, dr.square(turn), 0)
@@ -117,15 +118,12 @@ def lists(search: Search, blocks: Blocks) -> Lists:
     left = dr.zeros(mi.UInt64, number)
     dr.scatter_add(left, mi.UInt64(dr.ceil(left2 / unit)), pairs.block)
     first, end = tab.range(pairs.piece)
-    cells = _in_cells(search, pairs, number, _verdicts(search, blocks, pairs, tested, seen))
-    dr.eval(begins, stops, first, end, goes_on)
+    cells = _in_cells(search, pairs, number, _verdicts(search, blocks, pairs, tested, seen), seen.straight)
+    dr.eval(begins, stops, first, end)
     return Lists(
         dr.opaque(mi.UInt32, number),
         *cells,
-        Runs(
-            List.of(kept & ~along, pairs.block, number, first),
-            List.of(kept & ~goes_on, pairs.block, number, end - 1),
-        ),
+        *_runs(tab, pairs.piece, kept, seen.straight, follows, pairs.block, number),
         List.of(begins & strong[0], pairs.block, number, first),
         List.of(stops & strong[1], pairs.block, number, end - 1),
         dr.sqrt(mi.Float(left) * unit) / (2 * np.pi),
@@ -139,9 +137,26 @@ def _of_next(flags: Any) -> Any:
     return (at < last) & dr.gather(mi.Bool, flags, dr.minimum(at + 1, last))
 
 
+def _runs(
+    tab: Table, piece: Any, taken: Any, straight: Any, follows: Any, place: Any, number: int
+) -> tuple[Runs, Runs]:
+    """Runs of the pieces that are taken at each of `number` places: of segments, and of chords where pieces are
+    straight; `follows`: whether a piece goes on from the one before."""
+    first, end = tab.range(piece)
+    of = partial(List.of, block=place, blocks=number)
+    found = []
+    for chosen, begin, stop in ((taken & ~straight, first, end - 1), (taken & straight, piece, piece)):
+        dr.eval(chosen)
+        before = dr.maximum(dr.arange(mi.UInt32, len(chosen)), 1) - 1
+        along = chosen & follows & dr.gather(mi.Bool, chosen, before)
+        dr.eval(along)
+        found.append(Runs(of(chosen & ~along, items=begin), of(chosen & ~_of_next(along), items=stop)))
+    return found[0], found[1]
+
+
 def _in_cells(
-    search: Search, pairs: _Pairs, number: int, verdicts: tuple[Any, Any]
-) -> tuple[List, Any, List, Any, Runs]:
+    search: Search, pairs: _Pairs, number: int, verdicts: tuple[Any, Any], straight: Any
+) -> tuple[List, Any, List, Any, Runs, Runs]:
     """Those lists of cells of `number` blocks that `Lists` has, by what `_verdicts` says of pairs."""
     tab, cells = search.tab, ACROSS * ACROSS
     pair = places((verdicts[0] | verdicts[1]) != 0)
@@ -161,19 +176,15 @@ def _in_cells(
     follows = dr.gather(mi.Bool, tab.follows, own) & (entry > 0)
     follows &= dr.gather(mi.UInt32, piece, before) + 1 == own
     follows &= dr.gather(mi.UInt32, block, before) == dr.gather(mi.UInt32, block, entry)
-    along = whole & follows & dr.gather(mi.Bool, whole, cell * count + before)
-    dr.eval(along)
-    goes_on = _of_next(along)
     place = cell * dr.opaque(mi.UInt32, number) + dr.gather(mi.UInt32, block, entry)
     partly = ~asks & (corners > 0) & ~whole
-    first, end = tab.range(own)
     places_of = partial(List.of, block=place, blocks=cells * number)
     return (
         places_of(asks, items=own),
         dr.gather(mi.UInt32, corners, places(asks)),
         places_of(partly, items=own),
         dr.gather(mi.UInt32, corners, places(partly)),
-        Runs(places_of(whole & ~along, items=first), places_of(whole & ~goes_on, items=end - 1)),
+        *_runs(tab, own, whole, dr.gather(mi.Bool, straight, dr.gather(mi.UInt32, pair, entry)), follows, place, cells * number),
     )
 
 
@@ -254,8 +265,9 @@ def _look(search: Search, blocks: Blocks, pairs: _Pairs, beside: Near | None) ->
     if beside is not None and search.grazing is not None:
         by = beside.of(pairs.block, mi.Bool(True), search.grazing)
     fr = frame(search.source, p, search.tab)
-    open_, weak, far, inner2, start, stop, passes = _from_middle(search, fr, pairs.piece, x, V(normal), radius, by)
-    seen = _Seen(open_, weak, far, mi.Float(inner2), mi.Float(start), mi.Float(stop), passes)
+    found = _from_middle(search, fr, pairs.piece, x, V(normal), radius, by)
+    open_, weak, far, straight, inner2, start, stop, passes = found
+    seen = _Seen(open_, weak, far, straight, mi.Float(inner2), mi.Float(start), mi.Float(stop), passes)
     dr.eval(*seen)
     return seen
 
@@ -283,9 +295,11 @@ def _from_middle(
     weak = (cut_off(fr, room, k) < WEAK * search.tolerance) & (
         dr.squared_norm(fr.foot + fr.z2 * fr.a - piece.middle) > dr.square(REMOTE * radius)
     )
-    inner2, start, stop = F(0), F(0), F(0)
+    inner2, start, stop, real, imag = F(0), F(0), F(0), F(0), F(0)
+    known = dr.mask_t(F)(True)
     j = U(piece.first)
-    last = tuple(corner(fr, tab.corner(j, 0), k))
+    first = corner(fr, tab.corner(j, 0), k)
+    last = tuple(first)
     while j < piece.end:
         a, b = Corner(*last), corner(fr, tab.corner(j, 1), k)
         at = slopes(fr.a, a, b, k)
@@ -298,15 +312,33 @@ def _from_middle(
         inner2 += dr.select(begins, 0, dr.square(end_a - stop))
         start = dr.select(begins, end_a, start)
         stop = end_b
+        re, im = short(a, b, at)
+        real, imag = real + re, imag + im
+        known &= is_short(a, b, at, search.rule)
         last = tuple(b)
         j += 1
+    straight = known & _straight(search, fr, first, Corner(*last), real, imag, radius)
     passes = dr.mask_t(F)(False)
     if dr.hint(beside is not None, mode="scalar"):
         assert beside is not None
         _, v2, close = other_than(beside, piece)
         if close:
             passes = worth(size, v2, search.tolerance)
-    return clear, weak, far, inner2, start, stop, passes
+    return clear, weak, far, straight, inner2, start, stop, passes
+
+
+def _straight(search: Search, fr: Frame, a: Corner, b: Corner, real: Any, imag: Any, radius: Any) -> Any:
+    """Whether the chord from a to b is short everywhere within `radius` of P, and sends what its segments do at P."""
+    k, rule = search.k, search.rule
+    at = slopes(fr.a, a, b, k)
+    re, im = short(a, b, at)
+    to_p2, d2 = dr.minimum(a.to_p2, b.to_p2), dr.minimum(a.d2, b.d2)
+    # sin²/s, of which ψ bends by k times length², changes by less than 3/s² along a unit
+    bend = at.b - at.a + 3 * k * radius * at.length2 / to_p2
+    room = dr.sqrt(d2) - radius
+    fits = (bend < BENT * rule.bend) & (room > 0) & (at.length2 < rule.near2 * dr.square(room)) & (to_p2 > 4 * radius * radius)
+    off2 = dr.square(re - real) + dr.square(im - imag)
+    return fits & (off2 < (STRAIGHT * 2 * np.pi * search.tolerance) ** 2)
 
 
 def _verdicts(search: Search, blocks: Blocks, pairs: _Pairs, tested: Any, seen: _Seen) -> tuple[Any, Any]:

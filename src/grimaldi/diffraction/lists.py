@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import drjit as dr
 import mitsuba
 
-from grimaldi.diffraction.corners import corner, leading
+from grimaldi.diffraction.corners import Corner, corner, leading, short, slopes
 from grimaldi.diffraction.edges import Chain, Margins, Nearest, Sum, chain_wave
 from grimaldi.diffraction.frame import Frame
 from grimaldi.diffraction.grazing import Chords, Near
@@ -55,7 +55,7 @@ def places(flags: Any) -> Any:
 
 
 class Runs(NamedTuple):
-    """Segments that follow each other: where runs begin, and the last of each."""
+    """Segments that follow each other, or chords of pieces: where runs begin, and the last of each."""
 
     first: List
     last: List
@@ -73,7 +73,9 @@ class Lists(NamedTuple):
     partly: List  # of cells: pieces that reach it in part, what lies between its corners evenly
     corners: Any  # of each of those the same bits
     whole: Runs  # of cells: those of pieces that reach it, but not all of the block as far as is known
+    whole_chords: Runs
     runs: Runs  # of blocks
+    chords: Runs
     begins: List  # of blocks: segments at whose start a far run begins
     stops: List  # and at whose end one stops
     left: Any
@@ -152,6 +154,29 @@ def _of_runs(
 
 
 @dr.syntax
+def _of_chords(total: tuple[Any, ...], fr: Frame, tab: Table, k: Any, runs: Runs, at: Any, active: Any) -> Any:
+    """The total, as in `_with`, with the runs of chords at some place of lists; these lie off the ray."""
+    F = tab.types.Float
+    real, imag, err_real, err_imag, rounding2, receiver2, nearest2, segment = total
+    i, end = runs.first.bounds(at, active)
+    while active & (i < end):
+        j, last = runs.first.item(i), runs.last.item(i)
+        past = tuple(corner(fr, tab.chord(j, 0), k))
+        while active & (j <= last):
+            a, b = Corner(*past), corner(fr, tab.chord(j, 1), k)
+            re, im = short(a, b, slopes(fr.a, a, b, k))
+            real, imag = real + re, imag + im
+            receiver2 = dr.minimum(receiver2, dr.minimum(a.to_p2, b.to_p2))
+            d2 = dr.minimum(a.on_ray2, b.on_ray2)
+            segment = dr.select(d2 < nearest2, tab.range(j)[0], segment)
+            nearest2 = dr.minimum(nearest2, d2)
+            past = tuple(b)
+            j += 1
+        i += 1
+    return real, imag, err_real, err_imag, rounding2, receiver2, nearest2, segment
+
+
+@dr.syntax
 def listed_sum(
     fr: Frame,
     found: Lists,
@@ -177,6 +202,8 @@ def listed_sum(
         i += 1
     total = _of_runs(total, fr, tab, k, rule, found.whole, cell, active)
     total = _of_runs(total, fr, tab, k, rule, found.runs, block, active)
+    total = _of_chords(total, fr, tab, k, found.whole_chords, cell, active)
+    total = _of_chords(total, fr, tab, k, found.chords, block, active)
     real, imag, err_real, err_imag, rounding2, receiver2, nearest2, nearest_segment = total
     i, end = found.begins.bounds(block, active)
     while active & (i < end):
