@@ -34,6 +34,8 @@ FINE = 1 << 16  # parts of its square, in which it is counted: sums of whole num
 WEAK = 0.3  # of the tolerance: |M| of an end that grows evenly between corners of cells which it reaches or not
 REMOTE = 1.5  # radii of a block, that such a piece is away from it at least
 ALL = (1 << ACROSS * ACROSS) - 1  # cells
+EVERY = (1 << LATTICE * LATTICE) - 1  # corners
+COARSE = sum(1 << (y * LATTICE + x) for y in range(0, LATTICE, 2) for x in range(0, LATTICE, 2))  # every other corner
 BENT = 2.0  # times what a short segment may bend by, that a chord may where it tells what its segments do
 STRAIGHT = 0.01  # of the tolerance: what M may change by where a piece's chord stands for its segments
 UNTESTED = 0.1  # of the tolerance: |M| of an end that reaches a block or not as a whole, by what its middle says
@@ -81,9 +83,10 @@ def lists(search: Search, blocks: Blocks) -> Lists:
     """What acts on each block."""
     tab, tolerance = search.tab, search.tolerance
     n, number = int(tab.n_pieces[0]), dr.width(blocks.p)
-    pairs = _pairs(search, blocks, n)
-    beside = _beside(search, blocks)
-    seen = _look(search, blocks, pairs, beside)
+    frames = _frames(search, blocks.p)
+    pairs = _pairs(search, blocks, frames, n)
+    beside = _beside(search, blocks, frames)
+    seen = _look(search, blocks, frames, pairs, beside)
 
     # where a piece reaches this block but not the next in the same plane, it may not reach all of it
     open_, closed = dr.zeros(mi.Bool, number * n), dr.zeros(mi.Bool, number * n)
@@ -188,11 +191,16 @@ def _in_cells(
     )
 
 
-def _pairs(search: Search, blocks: Blocks, n: int) -> _Pairs:
+def _frames(search: Search, p: Any) -> Frame:
+    """Evaluated: once for each point, not once for each pair."""
+    frames = frame(search.source, p, search.tab)
+    dr.eval(*frames[:5])
+    return frames
+
+
+def _pairs(search: Search, blocks: Blocks, frames: Frame, n: int) -> _Pairs:
     """Which of n pieces may act somewhere in a block: within the outlines' reach, and above some horizon."""
     tab, F = search.tab, search.tab.types.Float
-    frames = frame(search.source, blocks.p, tab)
-    dr.eval(*frames[:5])  # once a block, not once a pair
     index = dr.arange(mi.UInt32, dr.width(blocks.p) * n)
     block = index // n
     middle, reach = tab.sphere(index - block * n)
@@ -212,9 +220,9 @@ def _pairs(search: Search, blocks: Blocks, n: int) -> _Pairs:
     return _Pairs(block, found - block * n, found)
 
 
-def _of(frames: Frame, block: Any) -> Frame:
-    """The frames of some blocks."""
-    a, foot, z1, z2, lever = (dr.gather(type(values), values, block) for values in frames[:5])
+def _of(frames: Frame, some: Any) -> Frame:
+    """Some of the frames."""
+    a, foot, z1, z2, lever = (dr.gather(type(values), values, some) for values in frames[:5])
     return Frame(a, foot, z1, z2, lever, frames.plane)
 
 
@@ -241,18 +249,17 @@ def _finest(fr: Frame, k: Any, blocks: Blocks, block: Any, piece: Piece) -> Any:
     return finest * k / (2 * np.pi)
 
 
-def _beside(search: Search, blocks: Blocks) -> Near | None:
+def _beside(search: Search, blocks: Blocks, frames: Frame) -> Near | None:
     """The bodies whose silhouettes rays to each block pass closest by."""
     if search.grazing is None:
         return None
     middle = Receivers(blocks.p, blocks.n, blocks.active)
-    fr = frame(search.source, blocks.p, search.tab)
-    found = near(fr, search.grazing, search.k, middle, search.tab.types.Float(blocks.radius))
+    found = near(frames, search.grazing, search.k, middle, search.tab.types.Float(blocks.radius))
     dr.eval(found.body, found.v2, found.next_body, found.next_v2)
     return found
 
 
-def _look(search: Search, blocks: Blocks, pairs: _Pairs, beside: Near | None) -> _Seen:
+def _look(search: Search, blocks: Blocks, frames: Frame, pairs: _Pairs, beside: Near | None) -> _Seen:
     """Each piece from the middle of its block."""
     V = search.tab.types.Vector
     p = dr.gather(type(blocks.p), blocks.p, pairs.block)
@@ -264,8 +271,7 @@ def _look(search: Search, blocks: Blocks, pairs: _Pairs, beside: Near | None) ->
     by = None
     if beside is not None and search.grazing is not None:
         by = beside.of(pairs.block, mi.Bool(True), search.grazing)
-    fr = frame(search.source, p, search.tab)
-    found = _from_middle(search, fr, pairs.piece, x, V(normal), radius, by)
+    found = _from_middle(search, _of(frames, pairs.block), pairs.piece, x, V(normal), radius, by)
     open_, weak, far, straight, inner2, start, stop, passes = found
     seen = _Seen(open_, weak, far, straight, mi.Float(inner2), mi.Float(start), mi.Float(stop), passes)
     dr.eval(*seen)
@@ -354,14 +360,14 @@ def _verdicts(search: Search, blocks: Blocks, pairs: _Pairs, tested: Any, seen: 
     if search.probe is None:
         dr.scatter(asked, mi.UInt32(ALL), pair)
         return asked, reached
-    corners = LATTICE * LATTICE
-    index = dr.arange(mi.UInt32, len(pair) * corners)
-    entry = index // corners
-    place = index - entry * corners
-    seen_there = _reached(search, search.probe, blocks, pairs, dr.gather(mi.UInt32, pair, entry), place)
-    bits = dr.block_sum(dr.select(seen_there, mi.UInt32(1) << place, 0), corners)
     members = dr.gather(mi.UInt32, blocks.members, dr.gather(mi.UInt32, pairs.block, pair))
     weak = dr.gather(mi.Bool, seen.weak, pair)
+    first = members & dr.select(weak, mi.UInt32(COARSE), EVERY)
+    frames = _frames(search, blocks.lattice)
+    bits = _reached(search, blocks, frames, pairs, pair, first)
+    differ = (bits != 0) & (bits != first)
+    bits = dr.select(bits == first, members, bits)
+    bits |= _reached(search, blocks, frames, pairs, pair, dr.select(differ, members & ~first, 0))
     filled, known = _filled(bits, members)
     ask = mi.UInt32(0)
     for y in range(ACROSS):
@@ -390,14 +396,24 @@ def _filled(bits: Any, members: Any) -> tuple[Any, Any]:
     return (bits & members) | (beside(bits & members) & ~members), known
 
 
-def _reached(search: Search, probe: Rays, blocks: Blocks, pairs: _Pairs, pair: Any, place: Any) -> Any:
-    """Whether pieces reach corners of cells of blocks."""
-    tab = search.tab
-    at = dr.gather(mi.UInt32, pairs.block, pair) * LATTICE**2 + place
+def _reached(search: Search, blocks: Blocks, frames: Frame, pairs: _Pairs, pair: Any, asked: Any) -> Any:
+    """Which of the `asked` corners of cells the pieces of pairs reach; a bit for each."""
+    tab, probe, corners = search.tab, search.probe, LATTICE * LATTICE
+    assert probe is not None
+    index = dr.arange(mi.UInt32, len(pair) * corners)
+    of = index // corners
+    some = places(((dr.gather(mi.UInt32, asked, of) >> (index - of * corners)) & 1) != 0)
+    of = some // corners
+    place, own = some - of * corners, dr.gather(mi.UInt32, pair, of)
+    at = dr.gather(mi.UInt32, pairs.block, own) * corners + place
     p = dr.gather(type(blocks.lattice), blocks.lattice, at)
     n = dr.gather(type(blocks.normals), blocks.normals, at)
-    piece = tab.piece(dr.gather(mi.UInt32, pairs.piece, pair))
-    acts = sounds(frame(search.source, p, tab), piece, tab.types.Vector(n))
+    piece = tab.piece(dr.gather(mi.UInt32, pairs.piece, own))
+    acts = sounds(_of(frames, at), piece, tab.types.Vector(n))
     x = mi.Point3f(piece.middle + constant(tab.types.Vector, tab.centre))
     q = mi.Point3f(p)
-    return acts & probe.reaches(x, piece, q + probe.epsilon(q) * n, acts)
+    acts &= probe.reaches(x, piece, q + probe.epsilon(q) * n, acts)
+    bits = dr.zeros(mi.UInt32, len(pair))
+    dr.scatter_add(bits, dr.select(acts, mi.UInt32(1) << place, 0), of)
+    dr.eval(bits)
+    return bits & asked
