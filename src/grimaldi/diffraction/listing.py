@@ -70,6 +70,7 @@ class _Seen(NamedTuple):
     """Pieces from the middles of blocks."""
 
     open: Any  # whether it acts there
+    idle: Any  # whether that makes no difference
     weak: Any  # whether a chain cut off on it leaves little everywhere in the block
     far: Any  # whether leading terms serve everywhere in the block
     straight: Any  # whether its chord tells its wave everywhere in the block
@@ -90,7 +91,7 @@ def lists(search: Search, blocks: Blocks) -> Lists:
 
     # where a piece reaches this block but not the next in the same plane, it may not reach all of it
     open_, closed = dr.zeros(mi.Bool, number * n), dr.zeros(mi.Bool, number * n)
-    dr.scatter(open_, seen.open, pairs.index)
+    dr.scatter(open_, seen.open & ~seen.idle, pairs.index)
     dr.scatter(closed, ~seen.open, pairs.index)
     curved = dr.gather(mi.Float, blocks.bend, pairs.block) > 0
     changes = mi.Bool(curved)
@@ -100,7 +101,7 @@ def lists(search: Search, blocks: Blocks) -> Lists:
     limit = 2 * np.pi * tolerance
     faint = seen.far & (dr.maximum(dr.abs(seen.start), dr.abs(seen.stop)) < UNTESTED * limit)
     tested = ((curved | changes) & ~faint) | seen.passes
-    dropped = seen.open & ~tested & seen.far & (seen.inner2 < dr.square(CORNER * limit))
+    dropped = seen.open & ~tested & (seen.idle | (seen.far & (seen.inner2 < dr.square(CORNER * limit))))
     kept = seen.open & ~tested & ~dropped
     dr.eval(tested, kept, dropped)
 
@@ -272,8 +273,8 @@ def _look(search: Search, blocks: Blocks, frames: Frame, pairs: _Pairs, beside: 
     if beside is not None and search.grazing is not None:
         by = beside.of(pairs.block, mi.Bool(True), search.grazing)
     found = _from_middle(search, _of(frames, pairs.block), pairs.piece, x, V(normal), radius, by)
-    open_, weak, far, straight, inner2, start, stop, passes = found
-    seen = _Seen(open_, weak, far, straight, mi.Float(inner2), mi.Float(start), mi.Float(stop), passes)
+    open_, idle, weak, far, straight, inner2, start, stop, passes = found
+    seen = _Seen(open_, idle, weak, far, straight, mi.Float(inner2), mi.Float(start), mi.Float(stop), passes)
     dr.eval(*seen)
     return seen
 
@@ -285,25 +286,45 @@ def _from_middle(
     """What is in `_Seen`, along pieces i, for receivers within `radius` of P."""
     tab, k, probe = search.tab, search.k, search.probe
     F = tab.types.Float
-    U = dr.uint32_array_t(F)
     piece = tab.piece(i)
     acts = sounds(fr, piece, n)
     clear = dr.mask_t(F)(acts)
     size = cut_off(fr, piece, k)
+    far, straight, inner2, start, stop = _along(search, fr, piece, radius)
+    idle = far & _is_idle(inner2, start, stop, search.tolerance)
     if dr.hint(probe is not None, mode="scalar"):
         assert probe is not None
-        tested = acts & (size > search.share)
+        tested = acts & (size > search.share) & ~idle
         if tested:
             x = mi.Point3f(piece.middle + constant(tab.types.Vector, tab.centre))
             clear = acts & probe.reaches(x, piece, p, tested)
-    far = dr.mask_t(F)(True)
     room = piece._replace(reach=piece.reach + radius)
     weak = (cut_off(fr, room, k) < WEAK * search.tolerance) & (
         dr.squared_norm(fr.foot + fr.z2 * fr.a - piece.middle) > dr.square(REMOTE * radius)
     )
+    passes = dr.mask_t(F)(False)
+    if dr.hint(beside is not None, mode="scalar"):
+        assert beside is not None
+        _, v2, close = other_than(beside, piece)
+        if close:
+            passes = worth(size, v2, search.tolerance)
+    return clear, idle, weak, far, straight, inner2, start, stop, passes
+
+
+def _is_idle(inner2: Any, start: Any, stop: Any, tolerance: float) -> Any:
+    """Whether nothing is asked of a far piece, whether it reaches a block or not: all its corners are left out."""
+    limit = CORNER * 2 * np.pi * tolerance
+    return (inner2 < limit * limit) & (dr.maximum(dr.abs(start), dr.abs(stop)) < limit)
+
+
+@dr.syntax
+def _along(search: Search, fr: Frame, piece: Piece, radius: Any) -> tuple[Any, ...]:
+    """What is in `_Seen` of a piece's segments: `far`, `straight`, `inner2`, `start` and `stop`."""
+    tab, k = search.tab, search.k
+    F = tab.types.Float
+    far, known = dr.mask_t(F)(True), dr.mask_t(F)(True)
     inner2, start, stop, real, imag = F(0), F(0), F(0), F(0), F(0)
-    known = dr.mask_t(F)(True)
-    j = U(piece.first)
+    j = dr.uint32_array_t(F)(piece.first)
     first = corner(fr, tab.corner(j, 0), k)
     last = tuple(first)
     while j < piece.end:
@@ -324,13 +345,7 @@ def _from_middle(
         last = tuple(b)
         j += 1
     straight = known & _straight(search, fr, first, Corner(*last), real, imag, radius)
-    passes = dr.mask_t(F)(False)
-    if dr.hint(beside is not None, mode="scalar"):
-        assert beside is not None
-        _, v2, close = other_than(beside, piece)
-        if close:
-            passes = worth(size, v2, search.tolerance)
-    return clear, weak, far, straight, inner2, start, stop, passes
+    return far, straight, inner2, start, stop
 
 
 def _straight(search: Search, fr: Frame, a: Corner, b: Corner, real: Any, imag: Any, radius: Any) -> Any:
