@@ -12,7 +12,7 @@ import mitsuba as mi
 import numpy as np
 
 from grimaldi.diffraction.arrays import on_device
-from grimaldi.diffraction.corners import Corner, between, corner
+from grimaldi.diffraction.corners import Corner, between, corner, short, slopes
 from grimaldi.diffraction.creeping import damped
 from grimaldi.diffraction.frame import ROUNDINGS, Frame, constant
 from grimaldi.diffraction.grazing import Near, grazed, other_than, worth
@@ -146,6 +146,28 @@ def chain_wave(
         last = tuple(b)
         j += 1
     return Chain(Wave(real, imag, err_real, err_imag, rounding2), distance2, segment, receiver2, n)
+
+
+@dr.syntax
+def chord_wave(fr: Frame, tab: Table, first: Any, end: Any, k: Any, active: Any) -> Chain:
+    """The same along the chords of pieces first..end, neighbours of one another and off the ray; n is not counted."""
+    F = tab.types.Float
+    U = dr.uint32_array_t(F)
+    real, imag, distance2, receiver2, nearest = F(0), F(0), F(dr.inf), F(dr.inf), U(first)
+    j = U(first)
+    last = tuple(corner(fr, tab.chord(j, 0), k))
+    while active & (j < end):
+        a, b = Corner(*last), corner(fr, tab.chord(j, 1), k)
+        re, im = short(a, b, slopes(fr.a, a, b, k))
+        real, imag = real + re, imag + im
+        d2 = dr.minimum(a.on_ray2, b.on_ray2)
+        nearest = dr.select(d2 < distance2, j, nearest)
+        distance2 = dr.minimum(distance2, d2)
+        receiver2 = dr.minimum(receiver2, dr.minimum(a.to_p2, b.to_p2))
+        last = tuple(b)
+        j += 1
+    zero = F(0)
+    return Chain(Wave(real, imag, zero, zero, zero), distance2, tab.range(nearest)[0], receiver2, zero)
 
 
 # ---------------------------------------------------------------- planar holes and masks

@@ -18,7 +18,7 @@ from grimaldi.diffraction.edges import cut_off, sounds
 from grimaldi.diffraction.frame import Frame, constant, frame
 from grimaldi.diffraction.grazing import Chords, Near, near, other_than, worth
 from grimaldi.diffraction.hierarchy import least_detour
-from grimaldi.diffraction.lists import List, Lists, Runs, places
+from grimaldi.diffraction.lists import List, Lists, Parts, Runs, places
 from grimaldi.diffraction.model import ACROSS, LATTICE, Blocks, Receivers
 from grimaldi.diffraction.occlusion import Rays
 from grimaldi.diffraction.segment import Corners
@@ -160,7 +160,7 @@ def _runs(
 
 def _in_cells(
     search: Search, pairs: _Pairs, number: int, verdicts: tuple[Any, Any], straight: Any
-) -> tuple[List, Any, List, Any, Runs, Runs]:
+) -> tuple[Parts, Parts, Parts, Runs, Runs]:
     """Those lists of cells of `number` blocks that `Lists` has, by what `_verdicts` says of pairs."""
     tab, cells = search.tab, ACROSS * ACROSS
     pair = places((verdicts[0] | verdicts[1]) != 0)
@@ -182,13 +182,17 @@ def _in_cells(
     follows &= dr.gather(mi.UInt32, block, before) == dr.gather(mi.UInt32, block, entry)
     place = cell * dr.opaque(mi.UInt32, number) + dr.gather(mi.UInt32, block, entry)
     partly = ~asks & (corners > 0) & ~whole
-    places_of = partial(List.of, block=place, blocks=cells * number)
+    chords = dr.gather(mi.Bool, straight, dr.gather(mi.UInt32, pair, entry))
+    dr.eval(partly, chords, place, own)
+
+    def parts(chosen: Any) -> Parts:
+        return Parts(List.of(chosen, place, cells * number, own), dr.gather(mi.UInt32, corners, places(chosen)))
+
     return (
-        places_of(asks, items=own),
-        dr.gather(mi.UInt32, corners, places(asks)),
-        places_of(partly, items=own),
-        dr.gather(mi.UInt32, corners, places(partly)),
-        *_runs(tab, own, whole, dr.gather(mi.Bool, straight, dr.gather(mi.UInt32, pair, entry)), follows, place, cells * number),
+        parts(asks),
+        parts(partly & ~chords),
+        parts(partly & chords),
+        *_runs(tab, own, whole, chords, follows, place, cells * number),
     )
 
 

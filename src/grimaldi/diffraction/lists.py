@@ -12,8 +12,8 @@ from typing import Any, NamedTuple
 import drjit as dr
 import mitsuba
 
-from grimaldi.diffraction.corners import Corner, corner, leading, short, slopes
-from grimaldi.diffraction.edges import Chain, Margins, Nearest, Sum, chain_wave
+from grimaldi.diffraction.corners import corner, leading
+from grimaldi.diffraction.edges import Chain, Margins, Nearest, Sum, chain_wave, chord_wave
 from grimaldi.diffraction.frame import Frame
 from grimaldi.diffraction.grazing import Chords, Near
 from grimaldi.diffraction.model import Receivers
@@ -61,6 +61,22 @@ class Runs(NamedTuple):
     last: List
 
 
+class Parts(NamedTuple):
+    """Pieces that reach cells in part, with a bit for each corner that they reach: between them what they send grows
+    evenly."""
+
+    pieces: List
+    corners: Any
+
+    def share(self, i: Any, receivers: Receivers) -> Any:
+        """How much of the piece at a place reaches receivers."""
+        bits = dr.gather(mi.UInt32, self.corners, i)
+        near, far = (
+            dr.lerp(mi.Float((bits >> row) & 1), mi.Float((bits >> (row + 1)) & 1), receivers.u) for row in (0, 2)
+        )
+        return dr.lerp(near, far, receivers.v)
+
+
 class Lists(NamedTuple):
     """What acts on each block, or on each cell: pieces, runs of segments that reach it, ends of runs, |M| left out.
 
@@ -68,10 +84,9 @@ class Lists(NamedTuple):
     """
 
     blocks: Any  # how many
-    asked: List  # of cells: pieces that each receiver asks for
-    reach: Any  # of each of those a bit for each corner of the cell that it reaches: what counts where it takes no ray
-    partly: List  # of cells: pieces that reach it in part, what lies between its corners evenly
-    corners: Any  # of each of those the same bits
+    asked: Parts  # of cells: pieces that each receiver asks for; their corners count where it takes no ray
+    partly: Parts  # of cells: pieces that reach it in part
+    partly_chords: Parts
     whole: Runs  # of cells: those of pieces that reach it, but not all of the block as far as is known
     whole_chords: Runs
     runs: Runs  # of blocks
@@ -92,13 +107,6 @@ class Lists(NamedTuple):
         return self.beside.of(receivers.block, receivers.active, silhouettes)
 
 
-def share(corners: Any, i: Any, receivers: Receivers) -> Any:
-    """How much of a piece reaches receivers, by the corners of their cells: between them it grows evenly."""
-    bits = dr.gather(mi.UInt32, corners, i)
-    near, far = (dr.lerp(mi.Float((bits >> row) & 1), mi.Float((bits >> (row + 1)) & 1), receivers.u) for row in (0, 2))
-    return dr.lerp(near, far, receivers.v)
-
-
 class Listed(NamedTuple):
     """The pieces that receivers ask for, as a walk."""
 
@@ -107,18 +115,18 @@ class Listed(NamedTuple):
     least: Any
 
     def bounds(self, receivers: Receivers) -> tuple[Any, Any]:
-        return self.lists.asked.bounds(self.lists.cell(receivers), receivers.active)
+        return self.lists.asked.pieces.bounds(self.lists.cell(receivers), receivers.active)
 
     def visit(self, fr: Frame, i: Any) -> tuple[Any, Any, Any]:
         always = dr.mask_t(fr.z2)(True)
-        return self.lists.asked.item(i), always, always
+        return self.lists.asked.pieces.item(i), always, always
 
     def after(self, i: Any, inside: Any) -> Any:
         return i + 1
 
     def weight(self, fr: Frame, i: Any, piece: Piece, tested: Any) -> Any:
         """Without a ray by the corners of the cell."""
-        return dr.select(tested, 1, type(fr.z2)(share(self.lists.reach, i, self.receivers)))
+        return dr.select(tested, 1, type(fr.z2)(self.lists.asked.share(i, self.receivers)))
 
     def unasked(self, left: Any) -> Any:
         """Nothing: that such pieces grow evenly is part of the tolerance."""
@@ -155,25 +163,14 @@ def _of_runs(
 
 @dr.syntax
 def _of_chords(total: tuple[Any, ...], fr: Frame, tab: Table, k: Any, runs: Runs, at: Any, active: Any) -> Any:
-    """The total, as in `_with`, with the runs of chords at some place of lists; these lie off the ray."""
+    """The same with the runs of chords at some place of lists."""
     F = tab.types.Float
-    real, imag, err_real, err_imag, rounding2, receiver2, nearest2, segment = total
     i, end = runs.first.bounds(at, active)
     while active & (i < end):
-        j, last = runs.first.item(i), runs.last.item(i)
-        past = tuple(corner(fr, tab.chord(j, 0), k))
-        while active & (j <= last):
-            a, b = Corner(*past), corner(fr, tab.chord(j, 1), k)
-            re, im = short(a, b, slopes(fr.a, a, b, k))
-            real, imag = real + re, imag + im
-            receiver2 = dr.minimum(receiver2, dr.minimum(a.to_p2, b.to_p2))
-            d2 = dr.minimum(a.on_ray2, b.on_ray2)
-            segment = dr.select(d2 < nearest2, tab.range(j)[0], segment)
-            nearest2 = dr.minimum(nearest2, d2)
-            past = tuple(b)
-            j += 1
+        first, last = runs.first.item(i), runs.last.item(i)
+        total = _with(total, chord_wave(fr, tab, first, last + 1, k, active), F(1))
         i += 1
-    return real, imag, err_real, err_imag, rounding2, receiver2, nearest2, segment
+    return total
 
 
 @dr.syntax
@@ -192,13 +189,21 @@ def listed_sum(
     sums, nearest, margins = asked
     total = (*sums[:5], F(margins.receiver2), F(nearest.distance2), U(nearest.segment))
     active, block, cell = receivers.active, receivers.block, found.cell(receivers)
-    i, end = found.partly.bounds(cell, active)
+    i, end = found.partly.pieces.bounds(cell, active)
     while active & (i < end):
-        weight = F(share(found.corners, i, receivers))
+        weight = F(found.partly.share(i, receivers))
         reached = active & (weight > 0)
         if reached:
-            piece = tab.range(found.partly.item(i))
+            piece = tab.range(found.partly.pieces.item(i))
             total = _with(total, chain_wave(fr, tab, *piece, k, rule, None, False, reached), weight)
+        i += 1
+    i, end = found.partly_chords.pieces.bounds(cell, active)
+    while active & (i < end):
+        weight = F(found.partly_chords.share(i, receivers))
+        reached = active & (weight > 0)
+        if reached:
+            j = found.partly_chords.pieces.item(i)
+            total = _with(total, chord_wave(fr, tab, j, j + 1, k, reached), weight)
         i += 1
     total = _of_runs(total, fr, tab, k, rule, found.whole, cell, active)
     total = _of_runs(total, fr, tab, k, rule, found.runs, block, active)
