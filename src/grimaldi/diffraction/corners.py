@@ -45,7 +45,11 @@ def corner(frame: Frame, X: Any, k: Any) -> Corner:
     """The corner X, relative to the outlines' centre, with Δ and its slope free of cancellation."""
     x = X - frame.foot
     h = dr.dot(x, frame.a)
-    q = x - h * frame.a
+    return seen(frame, x - h * frame.a, h, k)
+
+
+def seen(frame: Frame, q: Any, h: Any, k: Any) -> Corner:
+    """The point at q across the ray and h along it."""
     d2 = dr.squared_norm(q)
     z2 = frame.z2 - h
     between = z2 > 0
@@ -124,6 +128,15 @@ def short(a: Corner, b: Corner, at: Slopes) -> tuple[Any, Any]:
         near_a * (re * a.cos - im_a * a.sin) + near_b * (re * b.cos - im_b * b.sin),
         near_a * (re * a.sin + im_a * a.cos) + near_b * (re * b.sin + im_b * b.cos),
     )
+
+
+def by_halves(frame: Frame, a: Corner, b: Corner, k: Any, rule: Corners) -> tuple[Any, Any, Any]:
+    """∫ C e^{ikΔ} dφ along two short halves of a segment, and whether they are that."""
+    middle = seen(frame, 0.5 * (a.q + b.q), 0.5 * (a.h + b.h), k)
+    first, second = slopes(frame.a, a, middle, k), slopes(frame.a, middle, b, k)
+    (re0, im0), (re1, im1) = short(a, middle, first), short(middle, b, second)
+    serves = is_short(a, middle, first, rule) & is_short(middle, b, second, rule)
+    return re0 + re1, im0 + im1, serves
 
 
 def leading(ray: Any, at: Corner, e: Any, k: Any) -> tuple[Any, Any]:

@@ -12,7 +12,7 @@ import mitsuba as mi
 import numpy as np
 
 from grimaldi.diffraction.arrays import on_device
-from grimaldi.diffraction.corners import Corner, between, corner, short, slopes
+from grimaldi.diffraction.corners import Corner, between, by_halves, corner, short, slopes
 from grimaldi.diffraction.creeping import damped
 from grimaldi.diffraction.frame import ROUNDINGS, Frame, constant
 from grimaldi.diffraction.grazing import Near, grazed, other_than, worth
@@ -124,6 +124,12 @@ def chain_wave(
         whole = active & ~ends.serves
         if dr.hint(not by_corners, mode="scalar"):
             whole = dr.mask_t(F)(active)
+        else:
+            halved = dr.mask_t(F)(whole)
+            if halved:
+                re, im, serves = by_halves(fr, a, b, k, rule.corners or NEVER)
+                whole &= ~serves
+                wave = re, im, F(0), F(0), F(0)
         if whole:
             seg = tab.segment(j)
             ln = line(fr, seg.X0, seg.e)
