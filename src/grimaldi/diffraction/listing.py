@@ -361,7 +361,12 @@ def _straight(search: Search, fr: Frame, a: Corner, b: Corner, real: Any, imag: 
     # sin²/s, of which ψ bends by k times length², changes by less than 3/s² along a unit
     bend = at.b - at.a + 3 * k * radius * at.length2 / to_p2
     room = dr.sqrt(d2) - radius
-    fits = (bend < BENT * rule.bend) & (room > 0) & (at.length2 < rule.near2 * dr.square(room)) & (to_p2 > 4 * radius * radius)
+    fits = (
+        (bend < BENT * rule.bend)
+        & (room > 0)
+        & (at.length2 < rule.near2 * dr.square(room))
+        & (to_p2 > 4 * radius * radius)
+    )
     off2 = dr.square(re - real) + dr.square(im - imag)
     return fits & (off2 < (STRAIGHT * 2 * np.pi * search.tolerance) ** 2)
 

@@ -7,6 +7,7 @@ terms of its two ends, C φ' e^{iψ}/(iψ').
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import drjit as dr
@@ -147,33 +148,60 @@ def _with(total: tuple[Any, ...], chain: Chain, share: Any) -> tuple[Any, ...]:
     )
 
 
+Tell = Callable[[Any, Any, Any], Chain]
+"""tell(first, end, active): what neighbouring segments, or chords of pieces, send."""
+
+
 @dr.syntax
-def _of_runs(
-    total: tuple[Any, ...], fr: Frame, tab: Table, k: Any, rule: Rule, runs: Runs, at: Any, active: Any
+def _of_parts(
+    total: tuple[Any, ...],
+    parts: Parts,
+    segments: Callable[[Any], tuple[Any, Any]],
+    tell: Tell,
+    receivers: Receivers,
+    at: Any,
 ) -> Any:
-    """The total, as in `_with`, with the runs at some place of lists."""
-    F = tab.types.Float
-    i, end = runs.first.bounds(at, active)
-    while active & (i < end):
-        first, last = runs.first.item(i), runs.last.item(i)
-        total = _with(total, chain_wave(fr, tab, first, last + 1, k, rule, None, False, active), F(1))
+    """The total, as in `_with`, with the pieces at some place of lists as far as they reach.
+
+    segments(piece): the first, and the one after the last.
+    """
+    F = type(total[0])
+    i, end = parts.pieces.bounds(at, receivers.active)
+    while receivers.active & (i < end):
+        weight = F(parts.share(i, receivers))
+        reached = receivers.active & (weight > 0)
+        if reached:
+            total = _with(total, tell(*segments(parts.pieces.item(i)), reached), weight)
         i += 1
     return total
 
 
 @dr.syntax
-def _of_chords(total: tuple[Any, ...], fr: Frame, tab: Table, k: Any, runs: Runs, at: Any, active: Any) -> Any:
-    """The same with the runs of chords at some place of lists."""
-    F = tab.types.Float
+def _of_runs(total: tuple[Any, ...], runs: Runs, tell: Tell, active: Any, at: Any) -> Any:
+    """The same with the runs at some place of lists."""
+    F = type(total[0])
     i, end = runs.first.bounds(at, active)
     while active & (i < end):
-        first, last = runs.first.item(i), runs.last.item(i)
-        total = _with(total, chord_wave(fr, tab, first, last + 1, k, active), F(1))
+        total = _with(total, tell(runs.first.item(i), runs.last.item(i) + 1, active), F(1))
         i += 1
     return total
 
 
 @dr.syntax
+def _of_ends(fr: Frame, tab: Table, k: Any, ends: List, stop: int, active: Any, at: Any) -> tuple[Any, Any]:
+    """What far runs send from where they begin, or less the same where they `stop` (0 or 1), at some place of lists."""
+    F = tab.types.Float
+    real, imag = F(0), F(0)
+    i, end = ends.bounds(at, active)
+    while active & (i < end):
+        seg = tab.segment(ends.item(i))
+        re, im = leading(fr.a, corner(fr, (seg.X0, seg.X1)[stop], k), seg.e, k)
+        real, imag = real + re, imag + im
+        i += 1
+    sign = 1 - 2 * stop
+    return sign * real, sign * imag
+
+
 def listed_sum(
     fr: Frame,
     found: Lists,
@@ -185,46 +213,29 @@ def listed_sum(
 ) -> tuple[Sum, Nearest, Margins]:
     """The sum over all that acts on the receivers' blocks; `asked`: what the pieces that `Listed` walks make of it."""
     F = tab.types.Float
-    U = dr.uint32_array_t(F)
     sums, nearest, margins = asked
-    total = (*sums[:5], F(margins.receiver2), F(nearest.distance2), U(nearest.segment))
     active, block, cell = receivers.active, receivers.block, found.cell(receivers)
-    i, end = found.partly.pieces.bounds(cell, active)
-    while active & (i < end):
-        weight = F(found.partly.share(i, receivers))
-        reached = active & (weight > 0)
-        if reached:
-            piece = tab.range(found.partly.pieces.item(i))
-            total = _with(total, chain_wave(fr, tab, *piece, k, rule, None, False, reached), weight)
-        i += 1
-    i, end = found.partly_chords.pieces.bounds(cell, active)
-    while active & (i < end):
-        weight = F(found.partly_chords.share(i, receivers))
-        reached = active & (weight > 0)
-        if reached:
-            j = found.partly_chords.pieces.item(i)
-            total = _with(total, chord_wave(fr, tab, j, j + 1, k, reached), weight)
-        i += 1
-    total = _of_runs(total, fr, tab, k, rule, found.whole, cell, active)
-    total = _of_runs(total, fr, tab, k, rule, found.runs, block, active)
-    total = _of_chords(total, fr, tab, k, found.whole_chords, cell, active)
-    total = _of_chords(total, fr, tab, k, found.chords, block, active)
-    real, imag, err_real, err_imag, rounding2, receiver2, nearest2, nearest_segment = total
-    i, end = found.begins.bounds(block, active)
-    while active & (i < end):
-        seg = tab.segment(found.begins.item(i))
-        re, im = leading(fr.a, corner(fr, seg.X0, k), seg.e, k)
+
+    def segments(first: Any, end: Any, active: Any) -> Chain:
+        return chain_wave(fr, tab, first, end, k, rule, None, False, active)
+
+    def chords(first: Any, end: Any, active: Any) -> Chain:
+        return chord_wave(fr, tab, first, end, k, active)
+
+    total: tuple[Any, ...] = (*sums[:5], F(margins.receiver2), F(nearest.distance2), nearest.segment)
+    total = _of_parts(total, found.partly, tab.range, segments, receivers, cell)
+    total = _of_parts(total, found.partly_chords, lambda piece: (piece, piece + 1), chords, receivers, cell)
+    total = _of_runs(total, found.whole, segments, active, cell)
+    total = _of_runs(total, found.runs, segments, active, block)
+    total = _of_runs(total, found.whole_chords, chords, active, cell)
+    total = _of_runs(total, found.chords, chords, active, block)
+    real, imag, err_real, err_imag, rounding2, receiver2, nearest2, segment = total
+    for ends, stop in ((found.begins, 0), (found.stops, 1)):
+        re, im = _of_ends(fr, tab, k, ends, stop, active, block)
         real, imag = real + re, imag + im
-        i += 1
-    i, end = found.stops.bounds(block, active)
-    while active & (i < end):
-        seg = tab.segment(found.stops.item(i))
-        re, im = leading(fr.a, corner(fr, seg.X1, k), seg.e, k)
-        real, imag = real - re, imag - im
-        i += 1
     left = F(dr.gather(type(found.left), found.left, block, active))
     return (
         Sum(real, imag, err_real, err_imag, rounding2, sums.unasked + left),
-        Nearest(nearest2, nearest_segment),
+        Nearest(nearest2, segment),
         Margins(nearest2, receiver2),
     )
