@@ -15,14 +15,15 @@ from numpy.typing import NDArray
 
 import grimaldi
 from grimaldi.bench import scenes
+from grimaldi.diffraction import listing
 from grimaldi.diffraction.arrays import types
 from grimaldi.diffraction.boundary import boundary
-from grimaldi.diffraction.corners import between, corner
+from grimaldi.diffraction.corners import between, by_halves, corner
 from grimaldi.diffraction.frame import Frame
 from grimaldi.diffraction.hierarchy import layout, least_detour
-from grimaldi.diffraction.model import Factor, Options, Receivers
+from grimaldi.diffraction.model import OUTSIDE, Factor, Options, Receivers
 from grimaldi.diffraction.reach import reach
-from grimaldi.diffraction.segment import Corners, Rule, line, segment_wave
+from grimaldi.diffraction.segment import Corners, Rule, line, segment_wave, sincos
 from grimaldi.engine.asking import ask
 from grimaldi.engine.blocks import Sight, Squares, squares
 from grimaldi.engine.cells import cells
@@ -59,7 +60,8 @@ def ways(rng: np.random.Generator, n: int, plane: bool) -> tuple[Any, Any, Any, 
 @pytest.mark.parametrize("plane", [False, True])
 @pytest.mark.parametrize("tolerance", [5e-2, 1e-3, 1e-6])
 def test_corners_tell_what_the_whole_segment_does(tolerance, plane):
-    """Each form within a tenth of the tolerance of the integral to 1e-10, wherever it says that it serves."""
+    """Each form within a tenth of the tolerance of the integral to 1e-10, wherever it says that it serves; so is each
+    half where a segment goes by halves."""
     frame, X0, X1, e, length = ways(np.random.default_rng(3), 200_000, plane)
     k = type(length)(1)
     exact = segment_wave(frame, line(frame, X0, e), length, k, Rule.of(1e-10), dr.mask_t(k)(True))
@@ -71,6 +73,20 @@ def test_corners_tell_what_the_whole_segment_does(tolerance, plane):
         serves = ends.serves.numpy()
         assert serves.sum() > 300
         assert off[serves].max() < 0.1 * tolerance
+    real, imag, serves = by_halves(frame, a, b, k, rule)
+    off = np.hypot((real - exact.real).numpy(), (imag - exact.imag).numpy()) / (2 * np.pi)
+    more = serves.numpy() & ~between(frame.a, a, b, k, rule).serves.numpy()
+    assert more.sum() > 300
+    assert off[serves.numpy()].max() < 2 * 0.1 * tolerance
+
+
+@pytest.mark.parametrize("double", [False, True])
+def test_sines_are_exact_but_for_how_their_argument_is_rounded(double):
+    kind = types(double).Float
+    x = kind(np.random.default_rng(0).uniform(-1e4, 1e4, 100_000))
+    exact, rounding = x.numpy().astype(np.float64), dr.epsilon(kind)
+    for found, expected in zip(sincos(x), (np.sin(exact), np.cos(exact)), strict=True):
+        assert (abs(found.numpy() - expected) < rounding * (4 + 2 * abs(exact))).all()
 
 
 # ---------------------------------------------------------------- hierarchies
@@ -206,6 +222,42 @@ def test_fringes_that_lists_leave_out_are_too_fine_for_pixels():
     at_points, of_means = np.sqrt((abs(off) ** 2).mean()), np.sqrt((abs(off.mean(axis=1)) ** 2).mean())
     assert at_points > 0.2 * tolerance
     assert of_means < 0.25 * at_points
+
+
+def test_chords_tell_what_the_segments_of_their_pieces_do(monkeypatch):
+    """Bodies so finely meshed that a piece has several segments: by chords where they serve, and by segments alone."""
+    tolerance = 5e-2
+    monkeypatch.setattr(scenes, "SPLIT", 40)
+    monkeypatch.setattr(scenes, "WAVELENGTH", 2.0)  # fringes wider than blocks
+    floor = Floor(tolerance, "none")
+    factor: Any = floor.light.beams[0].factor
+    places = np.random.default_rng(1).uniform(0, 64, (2, 2000))
+    by_chords, _ = floor.both(floor.film, *places)
+    assert factor.single.lists(floor.film.blocks).chords.first.begin.numpy()[-1] > 1000
+    monkeypatch.setattr(listing, "STRAIGHT", 0.0)
+    by_segments, _ = floor.both(floor.film, *places)
+    assert factor.single.lists(floor.film.blocks).chords.first.begin.numpy()[-1] == 0
+    off = abs(by_chords - by_segments)
+    assert np.sqrt((off**2).mean()) < 0.1 * tolerance
+    assert 0 < off.max() < 0.5 * tolerance
+
+
+def test_a_square_has_a_block_for_each_of_three_surfaces():
+    def see(x: Any, y: Any) -> Sight:
+        step = dr.floor(x / 6)  # at three heights
+        p = mi.Point3d(mi.Float64(x), mi.Float64(y), mi.Float64(step))
+        ray = dr.zeros(mi.RayDifferential3f, dr.width(x))
+        ray.o, ray.d = mi.Point3f(x, y, 100), mi.Vector3f(0, 0, -1)
+        n = dr.zeros(mi.Vector3f, dr.width(x)) + mi.Vector3f(0, 0, 1)
+        return Sight(ray, Receivers(p, n, dr.full(mi.Bool, True, dr.width(x))), mi.UInt32(step) + 1)
+
+    x, y = (mi.Float(v.astype(np.float32)) for v in np.random.default_rng(0).uniform(0, 16, (2, 1000)))
+    receivers = see(x, y).receivers
+    block = squares(see, 16, 0, 16).placed(x, y, receivers).block.numpy()
+    assert OUTSIDE not in block
+    height = receivers.p.z.numpy()
+    assert [len(np.unique(block[height == z])) for z in (0, 1, 2)] == [1, 1, 1]
+    assert len(np.unique(block)) == 3
 
 
 # ---------------------------------------------------------------- models recorded once
