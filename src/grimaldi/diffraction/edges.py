@@ -109,6 +109,7 @@ def chain_wave(
     F = tab.types.Float
     U = dr.uint32_array_t(F)
     by_corners = rule.corners is not None and not smooth
+    forms = rule.corners or NEVER
     real, imag, err_real, err_imag, rounding2 = F(0), F(0), F(0), F(0), F(0)
     distance2, segment, receiver2, n = F(dr.inf), U(first), F(dr.inf), F(0)
     _, across = _basis(fr.a)
@@ -116,7 +117,7 @@ def chain_wave(
     last = tuple(corner(fr, tab.corner(j, 0), k))  # a plain tuple: what Dr.Jit can carry from turn to turn
     while active & (j < end):
         a, b = Corner(*last), corner(fr, tab.corner(j, 1), k)
-        ends = between(fr.a, a, b, k, rule.corners or NEVER)
+        ends = between(fr.a, a, b, k, forms)
         wave = ends.real, ends.imag, F(0), F(0), F(0)
         d2 = dr.minimum(a.on_ray2, b.on_ray2)
         p2 = dr.minimum(a.to_p2, b.to_p2)
@@ -127,7 +128,7 @@ def chain_wave(
         else:
             halved = dr.mask_t(F)(whole)
             if halved:
-                re, im, serves = by_halves(fr, a, b, k, rule.corners or NEVER)
+                re, im, serves = by_halves(fr, a, b, k, forms)
                 whole &= ~serves
                 wave = re, im, F(0), F(0), F(0)
         if whole:

@@ -183,7 +183,7 @@ def _in_cells(
     place = cell * dr.opaque(mi.UInt32, number) + dr.gather(mi.UInt32, block, entry)
     partly = ~asks & (corners > 0) & ~whole
     chords = dr.gather(mi.Bool, straight, dr.gather(mi.UInt32, pair, entry))
-    dr.eval(partly, chords, place, own)
+    dr.eval(partly, chords, place, own, follows)
 
     def parts(chosen: Any) -> Parts:
         return Parts(List.of(chosen, place, cells * number, own), dr.gather(mi.UInt32, corners, places(chosen)))

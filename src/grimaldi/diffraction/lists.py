@@ -79,8 +79,9 @@ class Parts(NamedTuple):
 
 
 class Lists(NamedTuple):
-    """What acts on each block, or on each cell: pieces, runs of segments that reach it, ends of runs, |M| left out.
+    """What acts on each block, or on each cell: pieces, runs that reach it, ends of runs, |M| left out.
 
+    Of pieces, and of runs of them, those by their chords stand apart.
     Cell c of block b has the place c · blocks + b in lists of cells.
     """
 
