@@ -56,9 +56,9 @@ class Receivers(NamedTuple):
     v: Any = None
 
     def some(self, index: Any) -> Receivers:
-        """Those at places of the arrays, active and in no block."""
-        p, n = (dr.gather(type(v), v, index) for v in (self.p, self.n))
-        return Receivers(p, n, dr.full(type(self.active), True, dr.width(index)))
+        """Those at places of the arrays, active."""
+        p, n, *place = (None if v is None else dr.gather(type(v), v, index) for v in (self.p, self.n, *self[3:]))
+        return Receivers(p, n, dr.full(type(self.active), True, dr.width(index)), *place)
 
 
 OUTSIDE = 0xFFFFFFFF
@@ -126,6 +126,22 @@ class Grouped(Protocol):
     def among(self, blocks: Blocks) -> Evaluate:
         """The same for receivers in blocks; what lies OUTSIDE of all gets no M of any meaning."""
         ...
+
+
+@runtime_checkable
+class Twofold(Protocol):
+    """An `Evaluate` that asks `single`, and `double` where that errs by more than the tolerance: seldom, and slowly."""
+
+    @property
+    def single(self) -> Evaluate: ...
+
+    @property
+    def double(self) -> Evaluate: ...
+
+    @property
+    def tolerance(self) -> float: ...
+
+    def __call__(self, receivers: Receivers) -> Factor: ...
 
 
 Model = Callable[[Scene, Source, Outline, float, Options], Evaluate]

@@ -8,9 +8,11 @@ from typing import Any
 
 import drjit as dr
 
-from grimaldi.diffraction.model import OUTSIDE, Evaluate, Factor, Grouped, Receivers
+from grimaldi.diffraction.model import OUTSIDE, Evaluate, Factor, Grouped, Receivers, Twofold
 from grimaldi.engine.blocks import Squares
 from grimaldi.engine.frozen import frozen
+
+FEWEST = 127  # receivers, up to which the last is repeated: arrays as long as others of a scene need recordings of their own
 
 Ask = Callable[[Any, Any, Receivers], Factor]
 """ask(x, y, receivers): M at receivers that are seen at places of the film [pixels], Float64, evaluated."""
@@ -18,22 +20,40 @@ Ask = Callable[[Any, Any, Receivers], Factor]
 
 def ask(film: Squares, factor: Evaluate) -> Ask:
     """How to ask a model for M at what a camera sees."""
-    whole = frozen(factor)
+    whole = _replayed(factor)
     listed = factor.among(film.blocks) if isinstance(factor, Grouped) else factor
     if listed is factor:
         return lambda x, y, receivers: whole(receivers)
-    return partial(_by_blocks, film, frozen(listed), whole)
+    return partial(_by_blocks, film, _replayed(listed), whole)
+
+
+def _replayed(evaluate: Evaluate) -> Evaluate:
+    """A model recorded once; what it seldom does by itself, since recordings take as long as there is in them."""
+    if not isinstance(evaluate, Twofold):
+        return frozen(evaluate)
+    return partial(_twofold, frozen(evaluate.single), frozen(evaluate.double), evaluate.tolerance)
+
+
+def _twofold(single: Evaluate, double: Evaluate, tolerance: float, receivers: Receivers) -> Factor:
+    m = single(receivers)
+    return _with_others(m, receivers.active & (m.error > tolerance), double, receivers)
 
 
 def _by_blocks(film: Squares, listed: Evaluate, whole: Evaluate, x: Any, y: Any, receivers: Receivers) -> Factor:
     """Where a receiver among many lies in no block, all would wait for it: those are asked by themselves."""
     placed = film.placed(x, y, receivers)
     outside = receivers.active & (placed.block == OUTSIDE)
-    m = listed(placed)
-    left: Any = dr.compress(outside)
-    if len(left) == 0:
+    m = listed(placed._replace(active=receivers.active & ~outside))
+    return _with_others(m, outside, whole, receivers)
+
+
+def _with_others(m: Factor, where: Any, evaluate: Evaluate, receivers: Receivers) -> Factor:
+    """M, but another model's at some receivers."""
+    some: Any = dr.compress(where)
+    if len(some) == 0:
         return m
-    own = whole(receivers.some(left))
-    for values, of_own in zip(m, own, strict=True):
-        dr.scatter(values, of_own, left)
+    if len(some) < FEWEST:
+        some = dr.gather(type(some), some, dr.minimum(dr.arange(type(some), FEWEST), len(some) - 1))
+    for values, of_some in zip(m, evaluate(receivers.some(some)), strict=True):
+        dr.scatter(values, of_some, some)
     return m
