@@ -16,6 +16,7 @@ from grimaldi.camera import seen
 from grimaldi.coherence import groups, separated
 from grimaldi.conventions import Wavelength, parse_wavelengths
 from grimaldi.diffraction import model
+from grimaldi.diffraction.arrays import types
 from grimaldi.diffraction.boundary import boundary
 from grimaldi.diffraction.frame import toward
 from grimaldi.diffraction.model import Evaluate, Factor, Options, Receivers
@@ -108,8 +109,7 @@ class Light:
         p = self.hits.point(ray, si, active)
         receivers = Receivers(p, n, active)
         context = mi.BSDFContext()
-        zero = type(p.x)(0)
-        real, imag, error = ([zero] * len(self.keys) for _ in range(3))
+        real, imag, error = ([mi.Float(0)] * len(self.keys) for _ in range(3))
         amplitudes = [(mi.UnpolarizedSpectrum(0), mi.UnpolarizedSpectrum(0)) for _ in self.keys]
         for i, beam in enumerate(self.beams):
             m, holds = known[i] if known else (beam.factor(receivers), None)
@@ -122,8 +122,8 @@ class Light:
             k = beam.key
             re, im = amplitudes[k]
             amplitudes[k] = (
-                dr.fma(weight, mi.Float(u.real), re),
-                dr.fma(weight, mi.Float(u.imag), im),
+                dr.fma(weight, u.real, re),
+                dr.fma(weight, u.imag, im),
             )
             real[k], imag[k], error[k] = real[k] + u.real, imag[k] + u.imag, error[k] + u.error
         L = sum((re * re + im * im for re, im in amplitudes), mi.UnpolarizedSpectrum(0))
@@ -133,7 +133,7 @@ class Light:
 @dr.syntax
 def _unless(m: Factor, holds: Any, beam: Beam, receivers: Receivers) -> Factor:
     """M where it holds, the model's elsewhere."""
-    F = mi.Float64
+    F = mi.Float
     real, imag, error = F(m.real), F(m.imag), F(m.error)
     asked = receivers.active & ~holds
     if asked:
@@ -169,7 +169,7 @@ def prepare(scene: Scene, settings: Settings) -> Light:
             source,
             keys.index((wavelength, source.group)),
             factor(scene, source, chosen, 2 * np.pi / wavelength, options, where),
-            carrier(source, 2 * np.pi / wavelength),
+            carrier(source, 2 * np.pi / wavelength, types(double=False)),
         )
         for wavelength in wavelengths
         for source in sources

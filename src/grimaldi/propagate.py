@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import drjit as dr
 import numpy as np
 
+from grimaldi.diffraction.arrays import Types, types
 from grimaldi.diffraction.boundary import boundary
 from grimaldi.diffraction.curves import phase_allowed
 from grimaldi.diffraction.frame import incident
@@ -30,7 +31,7 @@ COARSEST = 16.0  # times looser ones and more, at which it is told by the root o
 
 
 class Wave(NamedTuple):
-    """U, |U_computed - U| and |U0| at receivers, Float64 Dr.Jit arrays."""
+    """U, |U_computed - U| and |U0| at receivers, as Dr.Jit arrays."""
 
     real: Any
     imag: Any
@@ -90,19 +91,19 @@ def propagate_all(
 
 
 def _wave(source: Source, k: float, evaluate: Evaluate) -> Callable[[Receivers], Wave]:
-    times = carrier(source, k)
+    times = carrier(source, k, types(double=True))
     return lambda receivers: times(receivers, evaluate(receivers))
 
 
-def carrier(source: Source, k: float) -> Callable[[Receivers, Factor], Wave]:
-    """What makes U of M: U0 at receivers, times it."""
+def carrier(source: Source, k: float, precision: Types) -> Callable[[Receivers, Factor], Wave]:
+    """What makes U of M: U0 at receivers, times it, in one precision or the other."""
     ahead = None if source.aperture is None else beyond(source.aperture, source)
 
     def times(receivers: Receivers, m: Factor) -> Wave:
-        modulus, cos, sin = incident(source, receivers.p, k)
+        modulus, cos, sin = incident(source, receivers.p, k, precision)
         if ahead is not None:
             modulus = dr.select(ahead(receivers.p), modulus, 0)
-        F = type(modulus)
+        F = precision.Float
         re, im = F(m.real), F(m.imag)
         return Wave(modulus * (cos * re - sin * im), modulus * (cos * im + sin * re), modulus * F(m.error), modulus)
 

@@ -44,6 +44,7 @@ def trace(
     """
     ordinary = ordinary_emitters(scene)
     limit = 0xFFFFFFFF if max_depth < 0 else max_depth
+    goes_further = len(ordinary) > 0 or limit > 2  # sources of waves have no surface that a ray might meet
     mode = "evaluated" if on_cuda() else None  # a loop that is recorded cannot end kernels
 
     # --------------------- Loop state ----------------------
@@ -99,13 +100,14 @@ def trace(
             L += beta * ordinary_light(scene, sampler, ordinary, si, bsdf, scatters)
 
         # ---------------------- BSDF sampling ----------------------
-        bs, weight = bsdf.sample(mi.BSDFContext(), si, sampler.next_1d(active), sampler.next_2d(active), active)
-        ray = si.spawn_ray(si.to_world(bs.wo))
-        beta *= weight
-        eta *= bs.eta
-        si_prev = si
-        pdf_prev = bs.pdf
-        delta_prev = mi.has_flag(bs.sampled_type, mi.BSDFFlags.Delta)
+        if dr.hint(goes_further, mode="scalar"):
+            bs, weight = bsdf.sample(mi.BSDFContext(), si, sampler.next_1d(active), sampler.next_2d(active), active)
+            ray = si.spawn_ray(si.to_world(bs.wo))
+            beta *= weight
+            eta *= bs.eta
+            si_prev = si
+            pdf_prev = bs.pdf
+            delta_prev = mi.has_flag(bs.sampled_type, mi.BSDFFlags.Delta)
 
         # ---------------------- Stopping ----------------------
         strongest = dr.max(mi.unpolarized_spectrum(beta))
@@ -121,7 +123,7 @@ def trace(
 
 
 def _zeros(n: int) -> list[Any]:
-    return [mi.Float64(0) for _ in range(n)]
+    return [mi.Float(0) for _ in range(n)]
 
 
 def _where(mask: Any, new: list[Any], old: list[Any]) -> list[Any]:

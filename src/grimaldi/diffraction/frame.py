@@ -8,7 +8,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from grimaldi.diffraction.arrays import on_device, types
+from grimaldi.diffraction.arrays import Types, on_device, types
 from grimaldi.scene.model import Source, Spot, Vector
 from grimaldi.scene.planar import PlanarOutline
 
@@ -84,23 +84,23 @@ def way(z: Any, d2: Any) -> tuple[Any, Any, Any]:
     return excess, excess * inv, inv
 
 
-def incident(source: Source, p: Any, k: float) -> tuple[Any, Any, Any]:
-    """U0 at p (Float64) by eq. 1-2: its modulus, cosine and sine of its phase, reduced in Float64."""
-    V = types(double=True).Vector
+def incident(source: Source, p: Any, k: float, precision: Types) -> tuple[Any, Any, Any]:
+    """U0 at p (Float64) by eq. 1-2: its modulus, cosine and sine of its phase, which is reduced in Float64."""
+    V, F = types(double=True).Vector, precision.Float
+    modulus = on_device(F, source.amplitude)
     if source.is_plane:
         assert source.direction is not None
         path = dr.dot(p - constant(V, source.origin), constant(V, source.direction))
-        modulus = on_device(type(path), source.amplitude)
     else:
         assert source.position is not None
         d = p - constant(V, source.position)
         path = dr.norm(d)
-        modulus = on_device(type(path), source.amplitude) / path
+        modulus /= F(path)
         if source.spot is not None:
-            modulus *= dr.sqrt(profile(source.spot, d / path))
+            modulus *= F(dr.sqrt(profile(source.spot, d / path)))
     turns = path * on_device(type(path), k / (2 * np.pi))
     phase = 2 * np.pi * (turns - dr.round(turns)) + on_device(type(path), source.phase)
-    sin, cos = dr.sincos(phase)
+    sin, cos = dr.sincos(F(phase))
     return modulus, cos, sin
 
 

@@ -28,7 +28,7 @@ class Hits(NamedTuple):
     shapes: Any  # kind, first record, records a primitive, largest coordinate; by Mitsuba's index of the shape
     count: Any
     planes: Any  # n, h
-    quadrics: Any  # rows of A, b
+    quadrics: Any  # rows of A, b; None where there are none
     parts: Any  # numbers of the parts of joined meshes, one for each of its planes; None where there are none
 
     def surface(self, si: Any, active: Any) -> Any:
@@ -63,12 +63,13 @@ class Hits(NamedTuple):
         plane = dr.gather(P, self.planes, record, active & (shape.x == FLAT))
         n = V(plane.x, plane.y, plane.z)
         a, b, c = F(0), 0.5 * dr.dot(n, d), dr.dot(n, x) - plane.w - dr.select(shape.x == CURVED, F(1), 0)
-        for i in range(3):
+        for i in range(3) if self.quadrics is not None else ():
             row = dr.gather(P, self.quadrics, 3 * record + i, active & (shape.x == CURVED))
             A = V(row.x, row.y, row.z)
             y, e = dr.dot(A, x) + row.w, dr.dot(A, d)
             a, b, c = dr.fma(e, e, a), dr.fma(y, e, b), dr.fma(y, y, c)
-        s = -c / (b + dr.mulsign(dr.sqrt(b * b - a * c), b))
+        b += b if self.quadrics is None else dr.mulsign(dr.sqrt(b * b - a * c), b)
+        s = F(mi.Float(-c) / mi.Float(b))  # no more than Float32's rounding of the way: its own is far below
 
         scale = dr.max(dr.abs(o)) + shape.w + t
         sine = dr.maximum(dr.abs(dr.dot(si.n, ray.d)), GRAZING)
@@ -80,7 +81,7 @@ def hits(scene: Scene) -> Hits:
     """All surfaces of a scene that are flat or quadrics, for the Mitsuba variant in use."""
     index = indices(scene.mitsuba)
     shapes = np.zeros((int(index.max(initial=0)) + 1, 4))
-    flat, quadrics = [NOTHING], [np.zeros((1, 3, 4))]  # the device cannot gather from nothing
+    flat, quadrics = [NOTHING], [np.zeros((0, 3, 4))]  # the device cannot gather from nothing
     parts, count = [np.zeros(1, int)], len(shapes)
     faces = 1
     for i, surface in zip(index, scene.surfaces, strict=True):
@@ -98,14 +99,14 @@ def hits(scene: Scene) -> Hits:
             else:
                 parts.append(np.zeros(len(flat[-1].faces), int))
         else:
-            shapes[i] = CURVED, len(quadrics), 0, reach
+            shapes[i] = CURVED, len(quadrics) - 1, 0, reach
             quadrics.append(_quadric(surface))
     buffer = types(double=True).buffer
     return Hits(
         buffer(shapes),
         on_device(mi.UInt32, len(shapes)),
         _planes(one_of(flat)),
-        buffer(np.concatenate(quadrics)),
+        buffer(np.concatenate(quadrics)) if len(quadrics) > 1 else None,
         mi.UInt32(np.concatenate(parts).astype(np.uint32)) if count > len(shapes) else None,
     )
 

@@ -163,7 +163,7 @@ class Samples(NamedTuple):
         holds = active & (rank != OUTSIDE)
         place = rank * dr.opaque(mi.UInt32, spp) + (index - pixel * dr.opaque(mi.UInt32, spp))
         holds &= dr.gather(mi.Bool, self.there, place, holds)
-        real, imag, error = (dr.gather(mi.Float64, values, place, holds) for values in self[2:])
+        real, imag, error = (dr.gather(mi.Float, values, place, holds) for values in self[2:])
         return Known(real, imag, error, holds)
 
 
@@ -174,7 +174,7 @@ def _at_samples(light: Light, ask: Ask, sensor: Any, shot: Shot, first: int, pix
     width = dr.opaque(mi.UInt32, shot.width)
     own: Any = dr.compress(~cells.knows(every % width, every // width))
     if len(own) == 0:
-        none = dr.zeros(mi.Float64, 1)
+        none = dr.zeros(mi.Float, 1)
         return Samples(rank, dr.zeros(mi.Bool, 1), none, none, none)
     dr.scatter(rank, dr.arange(mi.UInt32, len(own)), own)
     index = dr.arange(mi.UInt32, len(own) * shot.spp)
@@ -183,14 +183,14 @@ def _at_samples(light: Light, ask: Ask, sensor: Any, shot: Shot, first: int, pix
     _, film = _sample(shot, pixel, index - of * dr.opaque(mi.UInt32, shot.spp))
     (_, receivers, shape), si = sight(light, sensor, shot, film.x, film.y)
     found = cells.beside(film.x, film.y, si.t, shape, receivers.active)
-    values = [mi.Float64(v) for v in found[:3]]
+    values = list(found[:3])
     dr.eval(values, found.holds, film, *receivers)
     left: Any = dr.compress(receivers.active & ~found.holds)
     if len(left):
         at = dr.gather(mi.Point2f, film, left)
         m = ask(at.x, at.y, receivers.some(left))
         for value, asked in zip(values, m[:3], strict=True):
-            dr.scatter(value, asked, left)
+            dr.scatter(value, mi.Float(asked), left)
     return Samples(rank, receivers.active, *values)
 
 
@@ -240,7 +240,7 @@ def _at(light: Light, ask: Ask, sensor: Any, shot: Shot, first: int, index: Any)
     (_, receivers, _), _ = sight(light, sensor, shot, film.x, film.y)
     dr.eval(film, *receivers[:3])
     m = ask(film.x, film.y, receivers)
-    return Samples(None, receivers.active, *(mi.Float64(value) for value in m[:3]))
+    return Samples(None, receivers.active, *(mi.Float(value) for value in m[:3]))
 
 
 def _traced(
