@@ -12,7 +12,8 @@ import pytest
 from grimaldi.diffraction.arrays import types
 from grimaldi.diffraction.corners import between, by_halves, corner
 from grimaldi.diffraction.frame import Frame
-from grimaldi.diffraction.segment import Corners, Rule, line, segment_wave, sincos
+from grimaldi.diffraction.segment import Corners, Rule, line, segment_wave
+from grimaldi.diffraction.sines import sincos
 
 mitsuba.set_variant("llvm_ad_rgb")
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from grimaldi.errors import GrimaldiWarning
 from grimaldi.outlines.extract import outline
 from grimaldi.outlines.model import Outline
+from grimaldi.parts import parts
 from grimaldi.scene.model import Scene, Source, Vector
 
 Reals = NDArray[np.float64]
@@ -68,11 +69,12 @@ def warn_of_faint_light(U: NDArray[np.complex128], free: Reals, tolerance: float
 
     U (wavelength, group, point); free (wavelength, point), the sum of all sources' |U0|.
     """
-    size, light = (np.abs(U[:, 0]) if U.shape[1] == 1 else np.abs(U).sum(axis=1)), free
-    faint = size < FEW * tolerance * light  # and so light > 0
+    faint = np.empty(free.shape, bool)
+    for some in parts(free.shape[1]):
+        faint[:, some] = np.abs(U[:, :, some]).sum(axis=1) < FEW * tolerance * free[:, some]  # and so light > 0
     if not faint.size or faint.mean() <= 0.5:
         return
-    typical = float(np.median(size[faint] / light[faint]))
+    typical = float(np.median(np.abs(U).sum(axis=1)[faint] / free[faint]))
     finer = max(10.0 ** np.floor(np.log10(1e-2 * max(typical, 1e-2 * tolerance))), 1e-12)
     warnings.warn(
         f"the light is below {FEW * tolerance:g} of what it is without obstacles at {faint.sum()} of {faint.size} "

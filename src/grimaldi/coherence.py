@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from grimaldi.parts import parts
 from grimaldi.scene.model import Source
 
 
@@ -24,4 +25,9 @@ def separated(sources: tuple[Source, ...]) -> tuple[Source, ...]:
 
 def intensity(U: NDArray[np.complex128]) -> NDArray[np.float64]:
     """Σ_λ Σ_group |U|² over the first two axes of U (wavelength, group, …)."""
-    return (U.real**2 + U.imag**2).sum(axis=(0, 1))
+    result = np.empty(U.shape[2:])
+    fields, each = U.reshape(*U.shape[:2], -1), result.ravel()
+    for some in parts(len(each)):
+        u = fields[:, :, some]
+        each[some] = (u.real**2 + u.imag**2).sum(axis=(0, 1))
+    return result

@@ -137,6 +137,7 @@ def _plus(total: NDArray[Any] | None, which: Any, values: NDArray[Any], n: int) 
 def checked_points(points: ArrayLike) -> NDArray[np.float64]:
     """A copy of points as (n, 3) float64, column by column; InputError where they are not that, or not finite."""
     from grimaldi.diffraction.arrays import aligned_empty
+    from grimaldi.parts import parts
 
     try:
         p = np.asarray(points, dtype=np.float64)
@@ -146,9 +147,10 @@ def checked_points(points: ArrayLike) -> NDArray[np.float64]:
         p = p[None]
     if p.ndim != 2 or p.shape[1] != 3:
         raise InputError(f"points: shape {p.shape} is not (n, 3); give one x, y, z to a row")
-    if not np.isfinite(p).all():
-        row = int(np.flatnonzero(~np.isfinite(p).all(axis=1))[0])
-        raise InputError(f"points: row {row} is not finite; give numbers")
     columns = aligned_empty(p.size, np.float64).reshape(3, -1)
-    columns[...] = p.T
+    for some in parts(len(p)):
+        columns[:, some] = p[some].T
+        if not np.isfinite(columns[:, some]).all():
+            row = int(np.flatnonzero(~np.isfinite(p).all(axis=1))[0])
+            raise InputError(f"points: row {row} is not finite; give numbers")
     return columns.T

@@ -23,7 +23,7 @@ from grimaldi.diffraction.frame import constant
 from grimaldi.diffraction.model import NYQUIST, Evaluate, Factor, Options, Receivers
 from grimaldi.diffraction.occlusion import Rays, rays
 from grimaldi.diffraction.screen import beyond
-from grimaldi.diffraction.segment import sincos
+from grimaldi.diffraction.sines import sincos
 from grimaldi.diffraction.surface import Patches, Surface, lit_surface, opening
 from grimaldi.errors import InputError
 from grimaldi.outlines.model import Outline

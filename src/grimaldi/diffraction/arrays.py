@@ -9,6 +9,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from grimaldi.parts import parts
 from grimaldi.variants import check_variant, on_cuda
 
 ALIGNED = 128  # bytes
@@ -47,7 +48,9 @@ def complex_array(real: Any, imag: Any) -> NDArray[np.complex128]:
     """Two Dr.Jit arrays as one NumPy array."""
     dr.eval(real, imag)  # in one kernel
     z = np.empty(len(real), np.complex128)
-    z.real, z.imag = real.numpy(), imag.numpy()
+    re, im = (np.broadcast_to(part.numpy(), z.shape) for part in (real, imag))
+    for some in parts(len(z)):
+        z.real[some], z.imag[some] = re[some], im[some]
     return z
 
 

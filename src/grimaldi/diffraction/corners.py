@@ -14,7 +14,8 @@ from typing import Any, NamedTuple
 import drjit as dr
 
 from grimaldi.diffraction.frame import Frame, way
-from grimaldi.diffraction.segment import Corners, sincos
+from grimaldi.diffraction.segment import Corners
+from grimaldi.diffraction.sines import sincos
 
 
 class Corner(NamedTuple):

@@ -9,6 +9,7 @@ import mitsuba as mi
 import numpy as np
 
 from grimaldi.diffraction.arrays import Types, on_device, types
+from grimaldi.diffraction.sines import of_turns
 from grimaldi.scene.model import Source, Spot, Vector
 from grimaldi.scene.planar import PlanarOutline
 
@@ -98,9 +99,8 @@ def incident(source: Source, p: Any, k: float, precision: Types) -> tuple[Any, A
         modulus /= F(path)
         if source.spot is not None:
             modulus *= F(dr.sqrt(profile(source.spot, d / path)))
-    turns = path * on_device(type(path), k / (2 * np.pi))
-    phase = 2 * np.pi * (turns - dr.round(turns)) + on_device(type(path), source.phase)
-    sin, cos = dr.sincos(F(phase))
+    turns = path * on_device(type(path), k / (2 * np.pi)) + on_device(type(path), source.phase / (2 * np.pi))
+    sin, cos = of_turns(F(turns - dr.round(turns)))
     return modulus, cos, sin
 
 

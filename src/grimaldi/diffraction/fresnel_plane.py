@@ -26,7 +26,7 @@ from grimaldi.diffraction.lattice import Lattice
 from grimaldi.diffraction.model import Evaluate, Factor, Options, Receivers
 from grimaldi.diffraction.planes import Plane, Remainder, Screen, remainder
 from grimaldi.diffraction.quadrature import Patches, Rule, nodes, patches
-from grimaldi.diffraction.segment import sincos
+from grimaldi.diffraction.sines import sincos
 from grimaldi.diffraction.transform import FINEST, seconds, sums
 from grimaldi.outlines.candidate import segments_for
 from grimaldi.outlines.model import Reals

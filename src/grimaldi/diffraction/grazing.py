@@ -25,7 +25,8 @@ from grimaldi.diffraction.frame import Frame
 from grimaldi.diffraction.hierarchy import NONE, Tree, flat, layout, least_detour
 from grimaldi.diffraction.knife_edge import amplitude
 from grimaldi.diffraction.model import Receivers
-from grimaldi.diffraction.segment import line, sincos
+from grimaldi.diffraction.segment import line
+from grimaldi.diffraction.sines import sincos
 from grimaldi.diffraction.table import Piece, cut
 from grimaldi.outlines.model import Outline
 from grimaldi.scene.model import Vector

@@ -26,7 +26,8 @@ from grimaldi.diffraction.frame import Frame, constant, frame
 from grimaldi.diffraction.model import NYQUIST, Evaluate, Factor, Options, Receivers
 from grimaldi.diffraction.occlusion import Rays, rays
 from grimaldi.diffraction.screen import beyond
-from grimaldi.diffraction.segment import Line, detour, line, sincos
+from grimaldi.diffraction.segment import Line, detour, line
+from grimaldi.diffraction.sines import sincos
 from grimaldi.diffraction.table import Segment, Table, needs_double, packed
 from grimaldi.errors import InputError
 from grimaldi.outlines.divided import divided, joined

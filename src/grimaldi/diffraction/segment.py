@@ -14,13 +14,13 @@ there. Beyond Y = K the path turns off to Y + iτ, where Gauss-Laguerre with few
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import drjit as dr
 import numpy as np
 
 from grimaldi.diffraction.frame import Frame
+from grimaldi.diffraction.sines import sincos
 
 
 class Corners(NamedTuple):
@@ -233,33 +233,6 @@ def _excess(z: Any, d2: Any) -> Any:
     """√(z² + d²) - z."""
     root = dr.sqrt(dr.fma(z, z, d2))
     return dr.select(z > 0, d2 / (root + dr.abs(z)), root + dr.abs(z))
-
-
-def _in_squares(f: Callable[[Any], Any]) -> list[float]:
-    """Coefficients, the highest first, of a polynomial in u² that is f(u) to 1e-7 for |u| <= 1/4, 0 left out."""
-    w = np.linspace(1e-6, 1 / 16, 1000)
-    return np.polynomial.Chebyshev.fit(w, f(np.sqrt(w)), 4).convert(kind=np.polynomial.Polynomial).coef[::-1].tolist()
-
-
-COSINE = _in_squares(lambda u: np.cos(2 * np.pi * u))
-SINE = _in_squares(lambda u: np.sin(2 * np.pi * u) / u)
-
-
-def sincos(x: Any) -> tuple[Any, Any]:
-    """Sine and cosine with the argument reduced first: Dr.Jit's own run away beyond 1e6 or so.
-
-    In Float32 by polynomials from there on: a reduction less.
-    """
-    turns = x * (0.5 / np.pi)
-    turns -= dr.round(turns)
-    if dr.itemsize_v(x) == 8:
-        return dr.sincos(2 * np.pi * turns)
-    u = dr.abs(turns) - 0.25
-    u2 = u * u
-    sin, cos = type(x)(COSINE[0]), type(x)(SINE[0])
-    for a, b in zip(COSINE[1:], SINE[1:], strict=True):
-        sin, cos = dr.fma(sin, u2, a), dr.fma(cos, u2, b)
-    return dr.mulsign(sin, turns), -u * cos
 
 
 def _asinh(x: Any) -> Any:

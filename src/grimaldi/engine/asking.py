@@ -12,7 +12,7 @@ from grimaldi.diffraction.model import OUTSIDE, Evaluate, Factor, Grouped, Recei
 from grimaldi.engine.blocks import Squares
 from grimaldi.engine.frozen import frozen
 
-FEWEST = 127  # receivers, up to which the last is repeated: arrays as long as others of a scene need recordings of their own
+FEWEST = 127  # receivers: of as many as there are of something else, or one, each would be recorded anew
 
 Ask = Callable[[Any, Any, Receivers], Factor]
 """ask(x, y, receivers): M at receivers that are seen at places of the film [pixels], Float64, evaluated."""
