@@ -5,7 +5,7 @@ from __future__ import annotations
 import subprocess
 import sys
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import drjit as dr
 import mitsuba
@@ -20,7 +20,7 @@ from grimaldi.diffraction.arrays import types
 from grimaldi.diffraction.boundary import boundary
 from grimaldi.diffraction.frame import Frame
 from grimaldi.diffraction.hierarchy import layout, least_detour
-from grimaldi.diffraction.model import OUTSIDE, Factor, Options, Receivers
+from grimaldi.diffraction.model import OUTSIDE, Evaluate, Factor, Options, Receivers
 from grimaldi.diffraction.reach import reach
 from grimaldi.engine.asking import ask
 from grimaldi.engine.blocks import Sight, Squares, squares
@@ -220,6 +220,35 @@ def test_a_recorded_model_tells_what_the_model_tells_wherever_it_is_asked():
             receivers = floor.sight(x, y).receivers
             for own, plain in zip(recorded(receivers), model(receivers), strict=True):
                 np.testing.assert_allclose(own.numpy(), mi.Float64(plain).numpy(), rtol=0, atol=1e-6)
+
+
+class Parts(NamedTuple):
+    """A model of two precisions."""
+
+    single: Evaluate
+    double: Evaluate
+    tolerance: float
+
+    def __call__(self, receivers: Receivers) -> Factor:
+        raise AssertionError("each of its parts is asked by itself")
+
+
+@pytest.mark.parametrize("above", [0, 1, 5, 800])
+def test_the_finer_part_of_a_model_is_asked_where_the_other_errs(above):
+    """Of a few receivers, which are filled up, and of many."""
+
+    def tells(real: float, error: float) -> Evaluate:
+        return lambda at: Factor(real + 0 * at.p.x, 0 * at.p.x, error * at.p.x, 1 * at.p.y)
+
+    x = dr.arange(mi.Float64, 1000)
+    tolerance = 999.5 - above
+    point = Receivers(mi.Point3d(x, 2 * x, 0), mi.Vector3f(0, 0, 1), x >= 0)
+    told = ask(None, Parts(tells(1, 1), tells(2, 0.5), tolerance))(None, None, point)  # pyright: ignore
+    errs = x.numpy() > tolerance
+    assert errs.sum() == above
+    np.testing.assert_array_equal(told.real.numpy(), np.where(errs, 2, 1))
+    np.testing.assert_array_equal(told.error.numpy(), np.where(errs, 0.5, 1) * x.numpy())
+    np.testing.assert_array_equal(told.clearance.numpy(), 2 * x.numpy())
 
 
 def test_a_model_that_hides_an_array_is_refused_not_recorded():
