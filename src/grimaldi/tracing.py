@@ -51,7 +51,7 @@ def trace(
     ray = mi.Ray3f(ray)
     depth = mi.UInt32(0)
     L = mi.Spectrum(0)
-    beta = mi.Spectrum(1)
+    beta: Any = mi.Spectrum(1)
     eta = mi.Float(1)
     active = mi.Bool(active)
     valid = mi.Bool(False)
