@@ -206,7 +206,17 @@ def test_a_square_has_a_block_for_each_of_three_surfaces():
     assert len(np.unique(block)) == 3
 
 
-# ---------------------------------------------------------------- models recorded once
+# ---------------------------------------------------------------- models traced and recorded once
+
+
+def test_a_field_is_summed_once(crowd):
+    """One kernel for all that is told of the points."""
+    scene, points = crowd
+    with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
+        dr.kernel_history_clear()
+        grimaldi.field(scene, points[:333], wavelength=scenes.WAVELENGTH, tolerance=2e-2)
+        kernels = dr.kernel_history([dr.KernelType.JIT])
+    assert sum(kernel["size"] == 333 for kernel in kernels) == 1
 
 
 def test_a_recorded_model_tells_what_the_model_tells_wherever_it_is_asked():

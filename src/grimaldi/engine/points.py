@@ -42,5 +42,5 @@ def at_points(
         p = double.Vector(*(double.taken(points[which, i]) for i in range(3)))
         n = normals(p)
         u = wave(Receivers(p, n, dr.mask_t(p.x)(True)))
-        dr.eval(u)
+        dr.eval(*u)
         yield Part(which, complex_array(u.real, u.imag), u.error.numpy(), u.free.numpy())
