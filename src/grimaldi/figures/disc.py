@@ -20,6 +20,7 @@ HALF = 512 * 4.6 / 2  # of the whole picture
 CENTRE = 10.0  # half of the second one
 STEP = 0.05  # of the radial line
 FINER = 8  # times than the field is computed: its finest fringes on the plane are 1.23 λ wide (2a over the way there)
+DIGITS = 9  # of a wavelength, in which both sides of the middle are told alike
 TAPS = 10  # on either side, of the filter between
 
 
@@ -60,7 +61,7 @@ def footprints(x: Reals, y: Reals, pixel: float, rho: Reals, intensity: Reals) -
     halfway beyond.
     """
     columns, rows = (np.append(centres - 0.5 * pixel, centres[-1] + 0.5 * pixel) for centres in (x, y))
-    a, b = np.abs(columns), np.abs(rows)
+    a, b = np.abs(columns).round(DIGITS), np.abs(rows).round(DIGITS)
     edges = np.concatenate([[0], rho + 0.5 * (rho[1] - rho[0])])
     far = np.hypot(a, b[:, None])
     whole = 0.5 * np.pi * _partial(0.5 * edges**2, 0.5 * far**2, edges, intensity, far)
