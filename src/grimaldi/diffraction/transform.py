@@ -7,6 +7,7 @@ follows the fringes, not the points.
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -22,7 +23,7 @@ Complexes = NDArray[np.complex128]
 FINEST = 1e-14  # of finufft's eps
 WORTH = 4  # so many times fewer cells are worth an interpolation
 MOST_CELLS = 1 << 26  # of the FFT
-ROWS = 32  # interpolated at a time: their matrix is a narrow band
+ROWS = 16  # interpolated at a time: their matrix is a narrow band, and BLAS is quick with so few
 SERIAL = 1 << 17  # products of numbers so small that BLAS starts no threads for them
 
 # Rough seconds on two cores; only which is larger matters, and mostly by far.
@@ -69,22 +70,31 @@ class Coarse(NamedTuple):
 
     def __call__(self, values: Complexes) -> Complexes:
         """Values (count, m) at the coarse points as values (n, m) at the points."""
-        from scipy.special import i0
-
         columns = np.ascontiguousarray(values).view(np.float64)
         result = aligned_empty(self.n * values.shape[1], np.complex128).reshape(self.n, -1)
         out = result.view(np.float64)
-        at = (np.arange(self.n) - self.n // 2) / self.spacing
-        for first in range(0, self.n, ROWS):
-            to = at[first : first + ROWS]
-            low, high = math.ceil(to[0] - 0.5 * self.width), math.floor(to[-1] + 0.5 * self.width) + 1
-            inside = 1 - ((to[:, None] - np.arange(low, high)) * (2 / self.width)) ** 2
-            kernel = np.where(inside < 0, 0, i0(self.beta * np.sqrt(np.maximum(inside, 0))))
-            near = columns[low + self.beyond : high + self.beyond]
+        for rows, near, kernel in _bands(self):
             step = max(SERIAL // kernel.size, 1)
             for start in range(0, out.shape[1], step):
-                np.matmul(kernel, near[:, start : start + step], out=out[first : first + ROWS, start : start + step])
+                some = slice(start, start + step)
+                np.matmul(kernel, columns[near, some], out=out[rows, some])
         return result
+
+
+@lru_cache(maxsize=8)  # both axes of a lattice are mostly alike, and so is the next field
+def _bands(coarse: Coarse) -> tuple[tuple[slice, slice, Reals], ...]:
+    """Some points of an axis at a time, the coarse points about them, and the kernel between both."""
+    from scipy.special import i0
+
+    at = (np.arange(coarse.n) - coarse.n // 2) / coarse.spacing
+    bands = []
+    for first in range(0, coarse.n, ROWS):
+        to = at[first : first + ROWS]
+        low, high = math.ceil(to[0] - 0.5 * coarse.width), math.floor(to[-1] + 0.5 * coarse.width) + 1
+        inside = 1 - ((to[:, None] - np.arange(low, high)) * (2 / coarse.width)) ** 2
+        kernel = np.where(inside < 0, 0, i0(coarse.beta * np.sqrt(np.maximum(inside, 0))))
+        bands.append((slice(first, first + ROWS), slice(low + coarse.beyond, high + coarse.beyond), kernel))
+    return tuple(bands)
 
 
 def sums(plane: Plane, points: Reals, x: Reals, c: Complexes, eps: float) -> Complexes:
