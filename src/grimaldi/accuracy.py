@@ -71,7 +71,9 @@ def warn_of_faint_light(U: NDArray[np.complex128], free: Reals, tolerance: float
     """
     faint = np.empty(free.shape, bool)
     for some in parts(free.shape[1]):
-        faint[:, some] = np.abs(U[:, :, some]).sum(axis=1) < FEW * tolerance * free[:, some]  # and so light > 0
+        u = U[:, :, some]
+        size = np.sqrt(u.real**2 + u.imag**2).sum(axis=1)  # quicker than `abs`, and too small where that is no matter
+        faint[:, some] = size < FEW * tolerance * free[:, some]  # and so light > 0
     if not faint.size or faint.mean() <= 0.5:
         return
     typical = float(np.median(np.abs(U).sum(axis=1)[faint] / free[faint]))

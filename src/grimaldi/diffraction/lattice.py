@@ -60,8 +60,8 @@ def _stands(grid: Lattice, points: Reals) -> bool:
         some = rows[0, 0] + np.arange(grid.columns) * u + np.arange(min(size, grid.rows))[:, None] * v
         for start in range(0, grid.rows, size):
             off = rows[start : start + size] - some[: grid.rows - start]
-            off -= start * v
-            if not max(off.max(), -off.min()) <= slack:
+            shift = start * v
+            if not max(off.max() - shift, shift - off.min()) <= slack:
                 return False
     return True
 
