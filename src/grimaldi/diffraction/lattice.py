@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from grimaldi.outlines.model import Reals
+from grimaldi.parts import parts
 from grimaldi.scene.model import Vector
 
 SHORT = 1 << 11  # points of most rows
@@ -57,10 +58,10 @@ def _stands(grid: Lattice, points: Reals) -> bool:
     size = max(1, CACHED // grid.columns)
     for axis, slack in enumerate(rounding(points[grid.corners])):
         rows, u, v = points[:, axis].reshape(grid.rows, grid.columns), grid.u[axis], grid.v[axis]
-        some = rows[0, 0] + np.arange(grid.columns) * u + np.arange(min(size, grid.rows))[:, None] * v
-        for start in range(0, grid.rows, size):
-            off = rows[start : start + size] - some[: grid.rows - start]
-            shift = start * v
+        first = rows[0, 0] + np.arange(grid.columns) * u + np.arange(min(size, grid.rows))[:, None] * v
+        for some in parts(grid.rows, size):
+            off = rows[some] - first[: some.stop - some.start]
+            shift = some.start * v
             if not max(off.max() - shift, shift - off.min()) <= slack:
                 return False
     return True

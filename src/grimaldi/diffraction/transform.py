@@ -17,6 +17,7 @@ from grimaldi.diffraction.arrays import aligned_empty
 from grimaldi.diffraction.lattice import Lattice
 from grimaldi.diffraction.planes import Plane
 from grimaldi.outlines.model import Reals
+from grimaldi.parts import parts
 
 Complexes = NDArray[np.complex128]
 
@@ -75,8 +76,7 @@ class Coarse(NamedTuple):
         out = result.view(np.float64)
         for rows, near, kernel in _bands(self):
             step = max(SERIAL // kernel.size, 1)
-            for start in range(0, out.shape[1], step):
-                some = slice(start, start + step)
+            for some in parts(out.shape[1], step):
                 np.matmul(kernel, columns[near, some], out=out[rows, some])
         return result
 
@@ -88,12 +88,12 @@ def _bands(coarse: Coarse) -> tuple[tuple[slice, slice, Reals], ...]:
 
     at = (np.arange(coarse.n) - coarse.n // 2) / coarse.spacing
     bands = []
-    for first in range(0, coarse.n, ROWS):
-        to = at[first : first + ROWS]
+    for rows in parts(coarse.n, ROWS):
+        to = at[rows]
         low, high = math.ceil(to[0] - 0.5 * coarse.width), math.floor(to[-1] + 0.5 * coarse.width) + 1
         inside = 1 - ((to[:, None] - np.arange(low, high)) * (2 / coarse.width)) ** 2
         kernel = np.where(inside < 0, 0, i0(coarse.beta * np.sqrt(np.maximum(inside, 0))))
-        bands.append((slice(first, first + ROWS), slice(low + coarse.beyond, high + coarse.beyond), kernel))
+        bands.append((rows, slice(low + coarse.beyond, high + coarse.beyond), kernel))
     return tuple(bands)
 
 

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from grimaldi.parts import parts
+
 if TYPE_CHECKING:
     from grimaldi.diffraction.model import Receivers
     from grimaldi.propagate import Wave
@@ -37,8 +39,7 @@ def at_points(
 
     double = types(double=True)
     normals = surface_normals(scene, source)
-    for first in range(0, len(points), block):
-        which = slice(first, min(first + block, len(points)))
+    for which in parts(len(points), block):
         p = double.Vector(*(double.taken(points[which, i]) for i in range(3)))
         n = normals(p)
         u = wave(Receivers(p, n, dr.mask_t(p.x)(True)))

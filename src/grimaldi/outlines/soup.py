@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from grimaldi.outlines.model import Integers, Reals
+from grimaldi.parts import parts
 from grimaldi.scene.model import Geometry, Mesh
 from grimaldi.scene.triangles import merged_points
 
@@ -58,7 +59,7 @@ class Soup:
 
     def parts(self) -> Iterator[slice]:
         """All triangles, so many at once as fit the cache."""
-        return (slice(first, first + PART) for first in range(0, len(self), PART))
+        return parts(len(self), PART)
 
     def triangles(self, which: Integers) -> Reals:
         """Corners (3 coordinates, 3 corners, k) of some triangles."""

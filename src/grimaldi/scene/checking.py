@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from grimaldi.errors import GrimaldiWarning, InputError
+from grimaldi.parts import parts
 from grimaldi.scene.bodies import faces_inward, vertices
 from grimaldi.scene.messages import where
 from grimaldi.scene.model import Body, Mesh, Scene, Sphere
@@ -136,8 +137,8 @@ def _check_body(body: Body) -> None:
 
 
 def _check_area(mesh: Mesh, name: str) -> None:
-    for first in range(0, len(mesh.faces), SOME):
-        a, b, c = np.moveaxis(mesh.vertices[mesh.faces[first : first + SOME]], 1, 0)
+    for some in parts(len(mesh.faces), SOME):
+        a, b, c = np.moveaxis(mesh.vertices[mesh.faces[some]], 1, 0)
         if np.cross(b - a, c - a).any():
             break
     else:
