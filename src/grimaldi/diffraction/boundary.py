@@ -235,7 +235,7 @@ class _Bodies:
         receivers = receivers._replace(active=receivers.active & (receivers.block != OUTSIDE))
         fr = frame(self.problem.source, receivers.p, self.tab)
         beside = found.near(receivers, self.grazing)
-        walk = Listed(found, receivers, self.tab.device(WEAK_HERE * self.problem.options.tolerance))
+        walk = Listed(found, self.tab, receivers, self.tab.device(WEAK_HERE * self.problem.options.tolerance))
         asked = self._sum(fr, walk, beside, receivers)
         return self._factor(fr, receivers, listed_sum(fr, found, self.tab, self.k, self.rule, asked, receivers))
 
@@ -270,5 +270,5 @@ class _Bodies:
         if corners is None or options.rim == "smooth" or options.tolerance < LOOSE:
             return None
         source, tolerance = self.problem.source, options.tolerance
-        search = Search(source, self.tab, self.k, corners, tolerance, self.share, self.probe, self.grazing)
+        search = Search(source, self.tab, self.k, self.rule, corners, tolerance, self.share, self.probe, self.grazing)
         return lists(search, blocks)

@@ -12,7 +12,7 @@ import mitsuba as mi
 import numpy as np
 
 from grimaldi.diffraction.arrays import on_device
-from grimaldi.diffraction.corners import Corner, between, by_halves, corner, short, slopes
+from grimaldi.diffraction.corners import Corner, between, by_halves, corner
 from grimaldi.diffraction.creeping import damped
 from grimaldi.diffraction.frame import ROUNDINGS, Frame, constant
 from grimaldi.diffraction.grazing import Near, grazed, other_than, worth
@@ -155,28 +155,6 @@ def chain_wave(
     return Chain(Wave(real, imag, err_real, err_imag, rounding2), distance2, segment, receiver2, n)
 
 
-@dr.syntax
-def chord_wave(fr: Frame, tab: Table, first: Any, end: Any, k: Any, active: Any) -> Chain:
-    """The same along the chords of pieces first..end, neighbours of one another and off the ray; n is not counted."""
-    F = tab.types.Float
-    U = dr.uint32_array_t(F)
-    real, imag, distance2, receiver2, nearest = F(0), F(0), F(dr.inf), F(dr.inf), U(first)
-    j = U(first)
-    last = tuple(corner(fr, tab.chord(j, 0), k))
-    while active & (j < end):
-        a, b = Corner(*last), corner(fr, tab.chord(j, 1), k)
-        re, im = short(a, b, slopes(fr.a, a, b, k))
-        real, imag = real + re, imag + im
-        d2 = dr.minimum(a.on_ray2, b.on_ray2)
-        nearest = dr.select(d2 < distance2, j, nearest)
-        distance2 = dr.minimum(distance2, d2)
-        receiver2 = dr.minimum(receiver2, dr.minimum(a.to_p2, b.to_p2))
-        last = tuple(b)
-        j += 1
-    zero = F(0)
-    return Chain(Wave(real, imag, zero, zero, zero), distance2, tab.range(nearest)[0], receiver2, zero)
-
-
 # ---------------------------------------------------------------- planar holes and masks
 
 
@@ -271,6 +249,12 @@ class Walk(Protocol):
         """What may be wrong where a piece takes no ray that leaves so much."""
         ...
 
+    def chain(
+        self, fr: Frame, i: Any, piece: Piece, k: Any, rule: Rule, passed: Passed | None, smooth: bool, active: Any
+    ) -> Chain:
+        """What the piece at a place sends."""
+        ...
+
 
 def taper(x: Any) -> Any:
     """1 up to x = 1/2, going smoothly to 0 at 1: a sharp end would send a wave of its own."""
@@ -309,6 +293,12 @@ class Everywhere(NamedTuple):
     def unasked(self, left: Any) -> Any:
         """All of it: a piece reaches a receiver or not."""
         return left
+
+    def chain(
+        self, fr: Frame, i: Any, piece: Piece, k: Any, rule: Rule, passed: Passed | None, smooth: bool, active: Any
+    ) -> Chain:
+        """By its segments."""
+        return chain_wave(fr, self.table, piece.first, piece.end, k, rule, passed, smooth, active)
 
 
 def closest(fr: Frame, seg: Segment, ln: Line) -> Any:
@@ -377,7 +367,7 @@ def body_sum(
             weight = walk.weight(fr, i, piece, tested)
             acts &= weight > 0
             passed = Passed(visible, past_real, past_imag) if beside is not None else None
-            chain = chain_wave(fr, tab, piece.first, piece.end, k, rule, passed, smooth, acts)
+            chain = walk.chain(fr, i, piece, k, rule, passed, smooth, acts)
             real, imag = dr.fma(weight, chain.wave.real, real), dr.fma(weight, chain.wave.imag, imag)
             err_real, err_imag = err_real + chain.wave.err_real, err_imag + chain.wave.err_imag
             rounding2 += chain.wave.rounding2

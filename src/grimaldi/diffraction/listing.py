@@ -13,15 +13,16 @@ import drjit as dr
 import mitsuba
 import numpy as np
 
-from grimaldi.diffraction.corners import Corner, corner, is_short, short, slopes
+from grimaldi.diffraction.chirps import FARTHEST, PACKETS, PLACES, Chirps, Samples, fit, sampled
+from grimaldi.diffraction.corners import Corner, corner, slopes
 from grimaldi.diffraction.edges import cut_off, sounds
 from grimaldi.diffraction.frame import Frame, constant, frame
 from grimaldi.diffraction.grazing import Chords, Near, near, other_than, worth
-from grimaldi.diffraction.hierarchy import least_detour
+from grimaldi.diffraction.hierarchy import NONE, least_detour
 from grimaldi.diffraction.lists import List, Lists, Parts, Runs, places
 from grimaldi.diffraction.model import ACROSS, LATTICE, Blocks, Receivers
 from grimaldi.diffraction.occlusion import Rays
-from grimaldi.diffraction.segment import Corners
+from grimaldi.diffraction.segment import Corners, Rule
 from grimaldi.diffraction.table import Piece, Table
 from grimaldi.scene.model import Source
 
@@ -36,8 +37,10 @@ REMOTE = 1.5  # radii of a block, that such a piece is away from it at least
 ALL = (1 << ACROSS * ACROSS) - 1  # cells
 EVERY = (1 << LATTICE * LATTICE) - 1  # corners
 COARSE = sum(1 << (y * LATTICE + x) for y in range(0, LATTICE, 2) for x in range(0, LATTICE, 2))  # every other corner
-BENT = 2.0  # times what a short segment may bend by, that a chord may where it tells what its segments do
-STRAIGHT = 0.01  # of the tolerance: what M may change by where a piece's chord stands for its segments
+FITS = 0.006  # of the tolerance: what chirps may leave of a piece's wave in the mean over a block
+BEATS = 2.0  # turns, by which a piece's ends may be further apart in one place of a block than in another: beats from
+# place to place would look like none,
+AWAY = 1.0  # radii of a block, that rays to it pass by the piece at least: waves beside a ray change within pixels
 UNTESTED = 0.1  # of the tolerance: |M| of an end that reaches a block or not as a whole, by what its middle says
 
 
@@ -51,7 +54,8 @@ class Search(NamedTuple):
     source: Source
     tab: Table
     k: Any
-    rule: Corners
+    rule: Rule
+    corners: Corners
     tolerance: float
     share: float
     probe: Rays | None
@@ -73,7 +77,6 @@ class _Seen(NamedTuple):
     idle: Any  # whether that makes no difference
     weak: Any  # whether a chain cut off on it leaves little everywhere in the block
     far: Any  # whether leading terms serve everywhere in the block
-    straight: Any  # whether its chord tells its wave everywhere in the block
     inner2: Any  # sum of squares of what its inner corners send
     start: Any  # C φ'/ψ' at its ends
     stop: Any
@@ -119,15 +122,28 @@ def lists(search: Search, blocks: Blocks) -> Lists:
     left2 += dr.select(begins & ~strong[0], dr.square(seen.start), 0)
     left2 += dr.select(stops & ~strong[1], dr.square(seen.stop), 0)
     unit = (CORNER * limit) ** 2 / FINE
+    first, end = tab.range(pairs.piece)
+    lattice = _frames(search, blocks.lattice)
+    verdicts = _verdicts(search, blocks, lattice, pairs, tested, seen)
+    flat = dr.gather(mi.Float, blocks.bend, pairs.block) == 0
+    waves = _chirps(search, blocks, lattice, pairs, flat & (kept | ((verdicts[0] | verdicts[1]) != 0)))
+    everywhere = kept & (waves.index != NONE)
+    left2 += dr.select(everywhere, dr.gather(mi.Float, waves.off2, waves.index, everywhere), 0)
     left = dr.zeros(mi.UInt64, number)
     dr.scatter_add(left, mi.UInt64(dr.ceil(left2 / unit)), pairs.block)
-    first, end = tab.range(pairs.piece)
-    cells = _in_cells(search, pairs, number, _verdicts(search, blocks, pairs, tested, seen), seen.straight)
-    dr.eval(begins, stops, first, end)
+    dr.eval(begins, stops, first, end, everywhere)
+    asked, asked_chirps, partly, whole, chirped = _in_cells(search, pairs, number, verdicts, waves, seen.passes)
     return Lists(
         dr.opaque(mi.UInt32, number),
-        *cells,
-        *_runs(tab, pairs.piece, kept, seen.straight, follows, pairs.block, number),
+        asked,
+        asked_chirps,
+        partly,
+        whole,
+        _runs(tab, pairs.piece, kept & ~everywhere, follows, pairs.block, number),
+        waves.chirps,
+        chirped,
+        List.of(everywhere, pairs.block, number, waves.index),
+        *_nearest(waves, pairs, number),
         List.of(begins & strong[0], pairs.block, number, first),
         List.of(stops & strong[1], pairs.block, number, end - 1),
         dr.sqrt(mi.Float(left) * unit) / (2 * np.pi),
@@ -141,26 +157,71 @@ def _of_next(flags: Any) -> Any:
     return (at < last) & dr.gather(mi.Bool, flags, dr.minimum(at + 1, last))
 
 
-def _runs(
-    tab: Table, piece: Any, taken: Any, straight: Any, follows: Any, place: Any, number: int
-) -> tuple[Runs, Runs]:
-    """Runs of the pieces that are taken at each of `number` places: of segments, and of chords where pieces are
-    straight; `follows`: whether a piece goes on from the one before."""
+def _runs(tab: Table, piece: Any, taken: Any, follows: Any, place: Any, number: int) -> Runs:
+    """Runs of the pieces that are taken at each of `number` places; `follows`: whether a piece goes on from the one
+    before."""
     first, end = tab.range(piece)
     of = partial(List.of, block=place, blocks=number)
-    found = []
-    for chosen, begin, stop in ((taken & ~straight, first, end - 1), (taken & straight, piece, piece)):
-        dr.eval(chosen)
-        before = dr.maximum(dr.arange(mi.UInt32, len(chosen)), 1) - 1
-        along = chosen & follows & dr.gather(mi.Bool, chosen, before)
-        dr.eval(along)
-        found.append(Runs(of(chosen & ~along, items=begin), of(chosen & ~_of_next(along), items=stop)))
-    return found[0], found[1]
+    dr.eval(taken)
+    before = dr.maximum(dr.arange(mi.UInt32, len(taken)), 1) - 1
+    along = taken & follows & dr.gather(mi.Bool, taken, before)
+    dr.eval(along)
+    return Runs(of(taken & ~along, items=first), of(taken & ~_of_next(along), items=end - 1))
+
+
+class _Waves(NamedTuple):
+    """Which pairs' waves are chirps."""
+
+    pair: Any  # whose waves are looked at
+    samples: Samples
+    chirps: Chirps
+    index: Any  # of the chirp of each pair; NONE if it has none
+    off2: Any  # of each chirp
+
+
+def _chirps(search: Search, blocks: Blocks, lattice: Frame, pairs: _Pairs, wanted: Any) -> _Waves:
+    """Those of the wanted pairs whose waves are chirps."""
+    tab = search.tab
+    index = dr.full(mi.UInt32, NONE, len(wanted))
+    pair = places(wanted)
+    block, piece = (dr.gather(mi.UInt32, of, pair) for of in pairs[:2])
+    samples = sampled(lattice, tab, search.k, search.rule, block, piece)
+    first = dr.arange(mi.UInt32, len(pair))
+    found = fit(samples, first, first + 1, tab.types)
+    fits = (found.off2 < (FITS * 2 * np.pi * search.tolerance) ** 2) & (found.beats < BEATS)
+    fits &= found.ray2 > dr.square(AWAY * dr.gather(mi.Float, blocks.radius, block))
+    dr.scatter(index, first, pair, fits)
+    packets = dr.zeros(tab.types.Float, 4 * PACKETS * len(pair))
+    for j, packet in enumerate(found.packets):
+        dr.scatter(packets, packet, PACKETS * first + j)
+    dr.eval(index, packets, found.off2)
+    return _Waves(pair, samples, Chirps(packets, tab.types), index, found.off2)
+
+
+@dr.syntax
+def _nearest(waves: _Waves, pairs: _Pairs, number: int) -> tuple[Any, Any]:
+    """The least distances to what may send chirps: of rays to PLACES of blocks, and the squares of blocks' own."""
+    n, samples = len(waves.pair), waves.samples
+    of = List.of(
+        dr.full(mi.Bool, True, n), dr.gather(mi.UInt32, pairs.block, waves.pair), number, dr.arange(mi.UInt32, n)
+    )
+    index = dr.arange(mi.UInt32, number * PLACES)
+    block = index // PLACES
+    ray2, receiver2 = mi.Float(FARTHEST), mi.Float(FARTHEST)
+    i, end = of.bounds(block, mi.Bool(True))
+    while i < end:
+        at = PLACES * i + index % PLACES
+        ray2 = dr.minimum(ray2, mi.Float(dr.gather(type(samples.ray2), samples.ray2, at)))
+        receiver2 = dr.minimum(receiver2, mi.Float(dr.gather(type(samples.receiver2), samples.receiver2, at)))
+        i += 1
+    clear = dr.sqrt(ray2)
+    dr.eval(clear, receiver2)
+    return clear, receiver2
 
 
 def _in_cells(
-    search: Search, pairs: _Pairs, number: int, verdicts: tuple[Any, Any], straight: Any
-) -> tuple[Parts, Parts, Parts, Runs, Runs]:
+    search: Search, pairs: _Pairs, number: int, verdicts: tuple[Any, Any], waves: _Waves, passes: Any
+) -> tuple[Parts, Any, Parts, Runs, Parts]:
     """Those lists of cells of `number` blocks that `Lists` has, by what `_verdicts` says of pairs."""
     tab, cells = search.tab, ACROSS * ACROSS
     pair = places((verdicts[0] | verdicts[1]) != 0)
@@ -181,18 +242,21 @@ def _in_cells(
     follows &= dr.gather(mi.UInt32, piece, before) + 1 == own
     follows &= dr.gather(mi.UInt32, block, before) == dr.gather(mi.UInt32, block, entry)
     place = cell * dr.opaque(mi.UInt32, number) + dr.gather(mi.UInt32, block, entry)
-    partly = ~asks & (corners > 0) & ~whole
-    chords = dr.gather(mi.Bool, straight, dr.gather(mi.UInt32, pair, entry))
-    dr.eval(partly, chords, place, own, follows)
+    of = dr.gather(mi.UInt32, pair, entry)
+    chirp = dr.gather(mi.UInt32, waves.index, of)
+    by_chirp = dr.select(dr.gather(mi.Bool, passes, of), NONE, chirp)  # what passes silhouettes is told apart by sides
+    reaches, told = ~asks & (corners > 0), chirp != NONE
+    dr.eval(chirp, by_chirp, reaches, told, place, own, follows)
 
-    def parts(chosen: Any) -> Parts:
-        return Parts(List.of(chosen, place, cells * number, own), dr.gather(mi.UInt32, corners, places(chosen)))
+    def parts(chosen: Any, items: Any) -> Parts:
+        return Parts(List.of(chosen, place, cells * number, items), dr.gather(mi.UInt32, corners, places(chosen)))
 
     return (
-        parts(asks),
-        parts(partly & ~chords),
-        parts(partly & chords),
-        *_runs(tab, own, whole, chords, follows, place, cells * number),
+        parts(asks, own),
+        dr.gather(mi.UInt32, by_chirp, places(asks)),
+        parts(reaches & ~whole & ~told, own),
+        _runs(tab, own, whole & ~told, follows, place, cells * number),
+        parts(reaches & told, chirp),
     )
 
 
@@ -277,8 +341,8 @@ def _look(search: Search, blocks: Blocks, frames: Frame, pairs: _Pairs, beside: 
     if beside is not None and search.grazing is not None:
         by = beside.of(pairs.block, mi.Bool(True), search.grazing)
     found = _from_middle(search, _of(frames, pairs.block), pairs.piece, x, V(normal), radius, by)
-    open_, idle, weak, far, straight, inner2, start, stop, passes = found
-    seen = _Seen(open_, idle, weak, far, straight, mi.Float(inner2), mi.Float(start), mi.Float(stop), passes)
+    open_, idle, weak, far, inner2, start, stop, passes = found
+    seen = _Seen(open_, idle, weak, far, mi.Float(inner2), mi.Float(start), mi.Float(stop), passes)
     dr.eval(*seen)
     return seen
 
@@ -294,7 +358,7 @@ def _from_middle(
     acts = sounds(fr, piece, n)
     clear = dr.mask_t(F)(acts)
     size = cut_off(fr, piece, k)
-    far, straight, inner2, start, stop = _along(search, fr, piece, radius)
+    far, inner2, start, stop = _along(search, fr, piece, radius)
     idle = far & _is_idle(inner2, start, stop, search.tolerance)
     if dr.hint(probe is not None, mode="scalar"):
         assert probe is not None
@@ -312,7 +376,7 @@ def _from_middle(
         _, v2, close = other_than(beside, piece)
         if close:
             passes = worth(size, v2, search.tolerance)
-    return clear, idle, weak, far, straight, inner2, start, stop, passes
+    return clear, idle, weak, far, inner2, start, stop, passes
 
 
 def _is_idle(inner2: Any, start: Any, stop: Any, tolerance: float) -> Any:
@@ -323,55 +387,33 @@ def _is_idle(inner2: Any, start: Any, stop: Any, tolerance: float) -> Any:
 
 @dr.syntax
 def _along(search: Search, fr: Frame, piece: Piece, radius: Any) -> tuple[Any, ...]:
-    """What is in `_Seen` of a piece's segments: `far`, `straight`, `inner2`, `start` and `stop`."""
-    tab, k = search.tab, search.k
+    """What is in `_Seen` of a piece's segments: `far`, `inner2`, `start` and `stop`."""
+    tab, k, rule = search.tab, search.k, search.corners
     F = tab.types.Float
-    far, known = dr.mask_t(F)(True), dr.mask_t(F)(True)
-    inner2, start, stop, real, imag = F(0), F(0), F(0), F(0), F(0)
+    far = dr.mask_t(F)(True)
+    inner2, start, stop = F(0), F(0), F(0)
     j = dr.uint32_array_t(F)(piece.first)
-    first = corner(fr, tab.corner(j, 0), k)
-    last = tuple(first)
+    last = tuple(corner(fr, tab.corner(j, 0), k))
     while j < piece.end:
         a, b = Corner(*last), corner(fr, tab.corner(j, 1), k)
         at = slopes(fr.a, a, b, k)
         margin = k * radius * dr.sqrt(at.length2) * dr.rsqrt(dr.minimum(a.to_p2, b.to_p2))
         least = dr.minimum(dr.abs(at.a), dr.abs(at.b)) - margin
         far &= (at.a * at.b > 0) & (least > 0) & (dr.minimum(a.d2, b.d2) > 4 * dr.square(radius))
-        far &= dr.square(least) > 2 * search.rule.far * k * at.length2 * dr.maximum(a.inv, b.inv)
+        far &= dr.square(least) > 2 * rule.far * k * at.length2 * dr.maximum(a.inv, b.inv)
         end_a, end_b = at.turn * a.C / (a.d2 * at.a), at.turn * b.C / (b.d2 * at.b)
         begins = j == piece.first
         inner2 += dr.select(begins, 0, dr.square(end_a - stop))
         start = dr.select(begins, end_a, start)
         stop = end_b
-        re, im = short(a, b, at)
-        real, imag = real + re, imag + im
-        known &= is_short(a, b, at, search.rule)
         last = tuple(b)
         j += 1
-    straight = known & _straight(search, fr, first, Corner(*last), real, imag, radius)
-    return far, straight, inner2, start, stop
+    return far, inner2, start, stop
 
 
-def _straight(search: Search, fr: Frame, a: Corner, b: Corner, real: Any, imag: Any, radius: Any) -> Any:
-    """Whether the chord from a to b is short everywhere within `radius` of P, and sends what its segments do at P."""
-    k, rule = search.k, search.rule
-    at = slopes(fr.a, a, b, k)
-    re, im = short(a, b, at)
-    to_p2, d2 = dr.minimum(a.to_p2, b.to_p2), dr.minimum(a.d2, b.d2)
-    # sin²/s, of which ψ bends by k times length², changes by less than 3/s² along a unit
-    bend = at.b - at.a + 3 * k * radius * at.length2 / to_p2
-    room = dr.sqrt(d2) - radius
-    fits = (
-        (bend < BENT * rule.bend)
-        & (room > 0)
-        & (at.length2 < rule.near2 * dr.square(room))
-        & (to_p2 > 4 * radius * radius)
-    )
-    off2 = dr.square(re - real) + dr.square(im - imag)
-    return fits & (off2 < (STRAIGHT * 2 * np.pi * search.tolerance) ** 2)
-
-
-def _verdicts(search: Search, blocks: Blocks, pairs: _Pairs, tested: Any, seen: _Seen) -> tuple[Any, Any]:
+def _verdicts(
+    search: Search, blocks: Blocks, frames: Frame, pairs: _Pairs, tested: Any, seen: _Seen
+) -> tuple[Any, Any]:
     """Of pieces that are `tested`, the cells of blocks where to ask for them, and the corners of cells they reach.
 
     By a ray to each corner. A cell is to be asked where its corners differ, if the piece is not too weak for that, or
@@ -387,7 +429,6 @@ def _verdicts(search: Search, blocks: Blocks, pairs: _Pairs, tested: Any, seen: 
     members = dr.gather(mi.UInt32, blocks.members, dr.gather(mi.UInt32, pairs.block, pair))
     weak = dr.gather(mi.Bool, seen.weak, pair)
     first = members & dr.select(weak, mi.UInt32(COARSE), EVERY)
-    frames = _frames(search, blocks.lattice)
     bits = _reached(search, blocks, frames, pairs, pair, first)
     differ = (bits != 0) & (bits != first)
     bits = dr.select(bits == first, members, bits)

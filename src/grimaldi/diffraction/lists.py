@@ -13,12 +13,14 @@ from typing import Any, NamedTuple
 import drjit as dr
 import mitsuba
 
+from grimaldi.diffraction.chirps import PLACES, SIDE, Chirps, place
 from grimaldi.diffraction.corners import corner, leading
-from grimaldi.diffraction.edges import Chain, Margins, Nearest, Sum, chain_wave, chord_wave
+from grimaldi.diffraction.edges import Chain, Margins, Nearest, Passed, Sum, chain_wave
 from grimaldi.diffraction.frame import Frame
 from grimaldi.diffraction.grazing import Chords, Near
+from grimaldi.diffraction.hierarchy import NONE
 from grimaldi.diffraction.model import Receivers
-from grimaldi.diffraction.segment import Rule
+from grimaldi.diffraction.segment import Rule, Wave
 from grimaldi.diffraction.table import Piece, Table
 
 mi: Any = mitsuba  # the stubs refuse numbers where arrays are asked for
@@ -56,7 +58,7 @@ def places(flags: Any) -> Any:
 
 
 class Runs(NamedTuple):
-    """Segments that follow each other, or chords of pieces: where runs begin, and the last of each."""
+    """Segments that follow each other: where runs begin, and the last of each."""
 
     first: List
     last: List
@@ -81,18 +83,21 @@ class Parts(NamedTuple):
 class Lists(NamedTuple):
     """What acts on each block, or on each cell: pieces, runs that reach it, ends of runs, |M| left out.
 
-    Of pieces, and of runs of them, those by their chords stand apart.
+    Pieces whose waves are chirps over a block are on no other list of what reaches it than those of chirps.
     Cell c of block b has the place c · blocks + b in lists of cells.
     """
 
     blocks: Any  # how many
     asked: Parts  # of cells: pieces that each receiver asks for; their corners count where it takes no ray
+    asked_chirps: Any  # of each of these, what tells its wave; NONE where its segments do
     partly: Parts  # of cells: pieces that reach it in part
-    partly_chords: Parts
     whole: Runs  # of cells: those of pieces that reach it, but not all of the block as far as is known
-    whole_chords: Runs
     runs: Runs  # of blocks
-    chords: Runs
+    chirps: Chirps
+    chirped: Parts  # of cells: those that reach it
+    everywhere: List  # of blocks: those that reach it
+    clear: Any  # least distance from what sends chirps: of the rays to PLACES of each block
+    receiver2: Any  # and of those places themselves, squared
     begins: List  # of blocks: segments at whose start a far run begins
     stops: List  # and at whose end one stops
     left: Any
@@ -113,6 +118,7 @@ class Listed(NamedTuple):
     """The pieces that receivers ask for, as a walk."""
 
     lists: Lists
+    table: Table
     receivers: Receivers
     least: Any
 
@@ -134,6 +140,20 @@ class Listed(NamedTuple):
         """Nothing: that such pieces grow evenly is part of the tolerance."""
         return type(left)(0)
 
+    @dr.syntax
+    def chain(
+        self, fr: Frame, i: Any, piece: Piece, k: Any, rule: Rule, passed: Passed | None, smooth: bool, active: Any
+    ) -> Chain:
+        """By its chirp, or by its segments where it has none."""
+        index = dr.gather(mi.UInt32, self.lists.asked_chirps, i, active)
+        told = active & (index != NONE)
+        whole = chain_wave(fr, self.table, piece.first, piece.end, k, rule, passed, smooth, active & ~told)
+        real, imag, *rest = whole.wave
+        if told:
+            re, im = self.lists.chirps.at(index, *place(self.receivers))
+            real, imag = type(real)(re), type(imag)(im)
+        return whole._replace(wave=Wave(real, imag, *rest))
+
 
 def _with(total: tuple[Any, ...], chain: Chain, share: Any) -> tuple[Any, ...]:
     """A share of a chain added to the five of a sum, the least distances² to P and to the ray, and the segment there.
@@ -150,29 +170,19 @@ def _with(total: tuple[Any, ...], chain: Chain, share: Any) -> tuple[Any, ...]:
 
 
 Tell = Callable[[Any, Any, Any], Chain]
-"""tell(first, end, active): what neighbouring segments, or chords of pieces, send."""
+"""tell(first, end, active): what neighbouring segments send."""
 
 
 @dr.syntax
-def _of_parts(
-    total: tuple[Any, ...],
-    parts: Parts,
-    segments: Callable[[Any], tuple[Any, Any]],
-    tell: Tell,
-    receivers: Receivers,
-    at: Any,
-) -> Any:
-    """The total, as in `_with`, with the pieces at some place of lists as far as they reach.
-
-    segments(piece): the first, and the one after the last.
-    """
+def _of_parts(total: tuple[Any, ...], parts: Parts, tab: Table, tell: Tell, receivers: Receivers, at: Any) -> Any:
+    """The total, as in `_with`, with the pieces at some place of lists as far as they reach."""
     F = type(total[0])
     i, end = parts.pieces.bounds(at, receivers.active)
     while receivers.active & (i < end):
         weight = F(parts.share(i, receivers))
         reached = receivers.active & (weight > 0)
         if reached:
-            total = _with(total, tell(*segments(parts.pieces.item(i)), reached), weight)
+            total = _with(total, tell(*tab.range(parts.pieces.item(i)), reached), weight)
         i += 1
     return total
 
@@ -186,6 +196,41 @@ def _of_runs(total: tuple[Any, ...], runs: Runs, tell: Tell, active: Any, at: An
         total = _with(total, tell(runs.first.item(i), runs.last.item(i) + 1, active), F(1))
         i += 1
     return total
+
+
+@dr.syntax
+def _of_chirps(found: Lists, receivers: Receivers, at: Any) -> tuple[Any, Any]:
+    """What is told by chirps, of the receivers' blocks and of their cells at places of lists."""
+    u, v = place(receivers)
+    active = receivers.active
+    real, imag = mi.Float(0), mi.Float(0)
+    i, end = found.everywhere.bounds(receivers.block, active)
+    while active & (i < end):
+        re, im = found.chirps.at(found.everywhere.item(i), u, v)
+        real, imag = real + re, imag + im
+        i += 1
+    i, end = found.chirped.pieces.bounds(at, active)
+    while active & (i < end):
+        weight = found.chirped.share(i, receivers)
+        re, im = found.chirps.at(found.chirped.pieces.item(i), u, v)
+        real, imag = dr.fma(weight, re, real), dr.fma(weight, im, imag)
+        i += 1
+    return real, imag
+
+
+def _margins(found: Lists, receivers: Receivers) -> Margins:
+    """Squared distances to what sends chirps, by what they are at PLACES of blocks."""
+    u, v = (0.5 * (SIDE - 1) * (x + 1) for x in place(receivers))
+    column, row = (dr.minimum(mi.UInt32(x), SIDE - 2) for x in (u, v))
+    first = receivers.block * PLACES + row * SIDE + column
+
+    def near(values: Any) -> list[Any]:
+        return [dr.gather(mi.Float, values, first + i, receivers.active) for i in (0, 1, SIDE, SIDE + 1)]
+
+    a, b, c, d = near(found.clear)
+    clear = dr.lerp(dr.lerp(a, b, u - column), dr.lerp(c, d, u - column), v - row)
+    a, b, c, d = near(found.receiver2)
+    return Margins(dr.square(clear), dr.minimum(dr.minimum(a, b), dr.minimum(c, d)))
 
 
 @dr.syntax
@@ -217,26 +262,24 @@ def listed_sum(
     sums, nearest, margins = asked
     active, block, cell = receivers.active, receivers.block, found.cell(receivers)
 
-    def segments(first: Any, end: Any, active: Any) -> Chain:
+    def tell(first: Any, end: Any, active: Any) -> Chain:
         return chain_wave(fr, tab, first, end, k, rule, None, False, active)
 
-    def chords(first: Any, end: Any, active: Any) -> Chain:
-        return chord_wave(fr, tab, first, end, k, active)
-
     total: tuple[Any, ...] = (*sums[:5], F(margins.receiver2), F(nearest.distance2), nearest.segment)
-    total = _of_parts(total, found.partly, tab.range, segments, receivers, cell)
-    total = _of_parts(total, found.partly_chords, lambda piece: (piece, piece + 1), chords, receivers, cell)
-    total = _of_runs(total, found.whole, segments, active, cell)
-    total = _of_runs(total, found.runs, segments, active, block)
-    total = _of_runs(total, found.whole_chords, chords, active, cell)
-    total = _of_runs(total, found.chords, chords, active, block)
+    total = _of_parts(total, found.partly, tab, tell, receivers, cell)
+    total = _of_runs(total, found.whole, tell, active, cell)
+    total = _of_runs(total, found.runs, tell, active, block)
     real, imag, err_real, err_imag, rounding2, receiver2, nearest2, segment = total
     for ends, stop in ((found.begins, 0), (found.stops, 1)):
         re, im = _of_ends(fr, tab, k, ends, stop, active, block)
         real, imag = real + re, imag + im
+    re, im = _of_chirps(found, receivers, cell)
+    real, imag = real + F(re), imag + F(im)
+    chirps = _margins(found, receivers)
+    ray2, receiver2 = dr.minimum(nearest2, F(chirps.ray2)), dr.minimum(receiver2, F(chirps.receiver2))
     left = F(dr.gather(type(found.left), found.left, block, active))
     return (
         Sum(real, imag, err_real, err_imag, rounding2, sums.unasked + left),
         Nearest(nearest2, segment),
-        Margins(nearest2, receiver2),
+        Margins(ray2, receiver2),
     )

@@ -51,7 +51,6 @@ class Table(NamedTuple):
     size: Any  # segments
     n_pieces: Any
     segments: Any
-    chords: Any  # packets: where each piece begins, and where it ends
     ranges: Any  # first segment and the one after the last, of pieces and then of longer runs
     pieces: Any
     piece_of: Any  # of each segment
@@ -73,11 +72,6 @@ class Table(NamedTuple):
     def corner(self, i: Any, end: int) -> Any:
         """Where a segment begins (0) or ends (1)."""
         a = dr.gather(self.types.Packet, self.segments, 3 * i + end)
-        return self.types.Vector(a.x, a.y, a.z)
-
-    def chord(self, i: Any, end: int) -> Any:
-        """Where a piece begins (0) or ends (1)."""
-        a = dr.gather(self.types.Packet, self.chords, 2 * i + end)
         return self.types.Vector(a.x, a.y, a.z)
 
     def range(self, i: Any) -> tuple[Any, Any]:
@@ -154,7 +148,6 @@ class Packed(NamedTuple):
     reach: float
     from_source: float
     segments: Reals  # (n, 12)
-    chords: Reals  # (pieces, 8)
     runs: NDArray[np.int64]  # (m, 2) first segment and the one after the last, of pieces and then of longer runs
     pieces: Reals  # (m, 20)
     ranges: NDArray[np.int64]
@@ -173,7 +166,6 @@ class Packed(NamedTuple):
             on_device(index, len(self.segments)),
             on_device(index, len(self.plan.order)),
             types.buffer(self.segments),
-            types.buffer(self.chords),
             index(self.runs.ravel().astype(np.uint32)),
             types.buffer(self.pieces),
             index(np.repeat(np.arange(len(self.ranges) - 1), np.diff(self.ranges)).astype(np.uint32)),
@@ -221,7 +213,6 @@ def packed(outline: Outline, source: Source, ranges: NDArray[np.int64] | None = 
         float(np.linalg.norm(np.concatenate([X0, X1]), axis=1).max()),
         np.inf if source.position is None else float(outline.distances(source.position).min()),
         segments,
-        np.concatenate([segments[ranges[:-1], :4], segments[ranges[1:] - 1, 4:8]], 1),
         runs,
         pieces,
         ranges,

@@ -1,0 +1,167 @@
+"""Waves over a flat block of receivers as chirps: what a piece sends there is e^{iψ}, ψ quadratic in the place, times
+an amplitude that is linear in it.
+
+k(r + s - R) bends by little over the few pixels of a block, and what a short piece sends besides changes slowly. So a
+wave is asked for at nine places of a block, and told anywhere in it for a sine and a cosine; where its own nine values
+are not told closely enough it is no chirp.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import drjit as dr
+import mitsuba
+import numpy as np
+
+from grimaldi.diffraction.arrays import Types
+from grimaldi.diffraction.edges import chain_wave
+from grimaldi.diffraction.frame import Frame
+from grimaldi.diffraction.hierarchy import least_detour
+from grimaldi.diffraction.model import ACROSS, LATTICE, Receivers
+from grimaldi.diffraction.segment import Rule
+from grimaldi.diffraction.sines import of_turns
+from grimaldi.diffraction.table import Table
+
+mi: Any = mitsuba  # the stubs refuse numbers where arrays are asked for
+
+SIDE = 3  # places across a block, by which waves are told
+GRID = [(u, v) for v in (-1.0, 0.0, 1.0) for u in (-1.0, 0.0, 1.0)]
+BETWEEN = [(u, v) for v in (-0.5, 0.5) for u in (-0.5, 0.5)]  # and by which that is tried
+PLACES = len(GRID) + len(BETWEEN)
+PACKETS = 5
+FARTHEST = 1e30  # square of distances, for no distance
+
+
+class Chirps(NamedTuple):
+    """Waves over blocks: real and imaginary part at places u, v of those, -1..1 along the film's rows and columns.
+
+    Five packets for each: of ψ/2π the terms in u, v, u², uv, v², then those of the amplitude, real and imaginary, in
+    1, u, v, u², uv, v².
+    """
+
+    packets: Any
+    types: Types
+
+    def at(self, i: Any, u: Any, v: Any) -> tuple[Any, Any]:
+        """The wave i."""
+        a, b, c, d, e = (dr.gather(self.types.Packet, self.packets, PACKETS * i + j) for j in range(PACKETS))
+        sin, cos = of_turns(_quadratic((0, a.x, a.y, a.z, a.w, b.x), u, v))
+        real = _quadratic((b.y, b.w, c.y, c.w, d.y, d.w), u, v)
+        imag = _quadratic((b.z, c.x, c.z, d.x, d.z, e.x), u, v)
+        return real * cos - imag * sin, real * sin + imag * cos
+
+
+def _quadratic(terms: tuple[Any, ...], u: Any, v: Any) -> Any:
+    """The value of one, by its terms in 1, u, v, u², uv, v²."""
+    one, of_u, of_v, of_uu, of_uv, of_vv = terms
+    return dr.fma(u, dr.fma(u, of_uu, dr.fma(v, of_uv, of_u)), dr.fma(v, dr.fma(v, of_vv, of_v), one))
+
+
+def place(receivers: Receivers) -> tuple[Any, Any]:
+    """Where receivers lie in their blocks."""
+    y = receivers.cell // ACROSS
+    x = receivers.cell - y * ACROSS
+    u, v = (mi.Float(cell) + part for cell, part in ((x, receivers.u), (y, receivers.v)))
+    return dr.fma(u, 2 / ACROSS, -1), dr.fma(v, 2 / ACROSS, -1)
+
+
+class Samples(NamedTuple):
+    """What each piece sends to PLACES of blocks: the wave, Δ/λ of its middle, and what that grows by from end to end;
+    and how far rays and receivers are from it."""
+
+    real: Any
+    imag: Any
+    turns: Any
+    spread: Any
+    ray2: Any  # squared distance
+    receiver2: Any  # the least
+
+
+def sampled(lattice: Frame, tab: Table, k: Any, rule: Rule, block: Any, piece: Any) -> Samples:
+    """By frames of the rays to the blocks' lattices, evaluated."""
+    F, n = tab.types.Float, dr.width(block)
+    U = dr.uint32_array_t(F)
+    index = dr.arange(U, PLACES * n)
+    of = index // PLACES
+    half = ACROSS // 2
+    places = U([int(half * (v + 1)) * LATTICE + int(half * (u + 1)) for u, v in (*GRID, *BETWEEN)])
+    at = dr.gather(U, block, of) * (LATTICE * LATTICE) + dr.gather(U, places, index - PLACES * of)
+    a, foot, z1, z2, lever = (dr.gather(type(values), values, at) for values in lattice[:5])
+    fr = Frame(a, foot, z1, z2, lever, lattice.plane)
+    own = dr.gather(U, piece, of)
+    first, end = tab.range(own)
+    chain = chain_wave(fr, tab, first, end, k, rule, None, False, dr.mask_t(F)(True))
+    middle, _ = tab.sphere(own)
+    turns = k / (2 * np.pi)
+    spread = turns * (least_detour(fr, tab.corner(end - 1, 1), 0) - least_detour(fr, tab.corner(first, 0), 0))
+    turns *= least_detour(fr, middle, 0)
+    found = chain.wave.real, chain.wave.imag, turns, spread, dr.minimum(chain.distance2, FARTHEST), chain.receiver2
+    dr.eval(*found)
+    return Samples(*found)
+
+
+class Fit(NamedTuple):
+    """Sums of waves as chirps, the square of what those leave of them in the mean over a block; and by how many turns
+    more the ends are apart in one of PLACES than in another, and how near rays to those pass by."""
+
+    packets: tuple[Any, ...]
+    off2: Any
+    beats: Any
+    ray2: Any  # squared distance
+
+
+def fit(samples: Samples, first: Any, end: Any, types: Types) -> Fit:
+    """The sum of waves first..end, by least squares over 3 × 3 places."""
+    F = types.Float
+    sums = _summed(samples, first, end)
+    middle = first + (end - first) // 2
+    turns = _terms([dr.gather(F, samples.turns, PLACES * middle + t) for t in range(len(GRID))])
+    left, right = [], []
+    for (u, v), re, im in zip((*GRID, *BETWEEN), sums[:PLACES], sums[PLACES:], strict=True):
+        sin, cos = of_turns(_quadratic((0, *turns[1:]), u, v))
+        left.append(re * cos + im * sin)
+        right.append(im * cos - re * sin)
+    real, imag = _terms(left[: len(GRID)]), _terms(right[: len(GRID)])
+    off2 = F(0)
+    for (u, v), re, im in zip((*GRID, *BETWEEN), left, right, strict=True):
+        off2 += dr.square(_quadratic(real, u, v) - re) + dr.square(_quadratic(imag, u, v) - im)
+    amplitude = [part for pair in zip(real, imag, strict=True) for part in pair]
+    numbers = [*turns[1:], *amplitude, F(0), F(0), F(0)]
+    packets = tuple(types.Packet(*numbers[4 * j : 4 * j + 4]) for j in range(PACKETS))
+    low, high, ray2 = F(dr.inf), F(-dr.inf), F(FARTHEST)
+    for t in range(PLACES):
+        spread = dr.gather(F, samples.spread, PLACES * first + t)
+        low, high = dr.minimum(low, spread), dr.maximum(high, spread)
+        ray2 = dr.minimum(ray2, dr.gather(F, samples.ray2, PLACES * first + t))
+    return Fit(packets, off2 / PLACES, high - low, ray2)
+
+
+@dr.syntax
+def _summed(samples: Samples, first: Any, end: Any) -> tuple[Any, ...]:
+    """Waves first..end at PLACES: real parts, then imaginary ones."""
+    sums = tuple(type(samples.real)(0) for _ in range(2 * PLACES))
+    i = type(first)(first)
+    while i < end:
+        sums = _with(sums, samples, i)
+        i += 1
+    return sums
+
+
+def _with(sums: tuple[Any, ...], samples: Samples, i: Any) -> tuple[Any, ...]:
+    """The sums with the wave i."""
+    waves = [dr.gather(type(x), x, PLACES * i + t) for x in (samples.real, samples.imag) for t in range(PLACES)]
+    return tuple(s + wave for s, wave in zip(sums, waves, strict=True))
+
+
+def _terms(values: list[Any]) -> tuple[Any, ...]:
+    """Of the quadratic nearest to values at GRID: 1, u, v, uv, u² - 2/3 and v² - 2/3 are orthogonal there."""
+
+    def along(term: Callable[[float, float], float]) -> Any:
+        weights = [term(u, v) for u, v in GRID]
+        return sum(w * x for w, x in zip(weights, values, strict=True) if w) / sum(w * w for w in weights)
+
+    of_uu, of_vv = along(lambda u, v: u * u - 2 / 3), along(lambda u, v: v * v - 2 / 3)
+    one = along(lambda u, v: 1) - 2 / 3 * (of_uu + of_vv)
+    return one, along(lambda u, v: u), along(lambda u, v: v), of_uu, along(lambda u, v: u * v), of_vv
