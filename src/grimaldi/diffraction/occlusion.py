@@ -62,7 +62,7 @@ class Rays(NamedTuple):
         margin = dr.minimum(4 * epsilon + across / dr.maximum(dr.abs(depth), GRAZING), 0.5 * length)
         end = length - margin
         hit = self.blockers.ray_intersect_preliminary(
-            mi.Ray3f(p + epsilon * d, d, dr.maximum(end - epsilon, 0), 0, mi.Color0f()), coherent=True, active=active
+            mi.Ray3f(p + epsilon * d, d, dr.maximum(end - epsilon, 0), 0, mi.Color0f()), active=active
         )
         blocked = hit.is_valid()
         left = end - epsilon - hit.t
@@ -72,7 +72,7 @@ class Rays(NamedTuple):
             start = end - left + margin
             more = end > start  # a ray of negative length would count as blocked
             blocked = more & self.blockers.ray_test(
-                mi.Ray3f(p + start * d, d, dr.maximum(end - start, 0), 0, mi.Color0f()), True, active & more
+                mi.Ray3f(p + start * d, d, dr.maximum(end - start, 0), 0, mi.Color0f()), active & more
             )
         return ~blocked
 

@@ -118,7 +118,7 @@ def sight(light: Light, sensor: Any, shot: Shot, x: Any, y: Any) -> tuple[Sight,
     """What the camera sees at places of the film [pixels], and Mitsuba's interactions."""
     place = mi.Point2f(x, y) / mi.Point2f(dr.opaque(mi.Float, shot.width), dr.opaque(mi.Float, shot.height))
     ray, _ = sensor.sample_ray_differential(sensor.shutter_open(), 0.5, place, mi.Point2f(0.5))
-    si = light.scene.mitsuba.ray_intersect(ray)
+    si = light.scene.mitsuba.ray_intersect(ray, mi.RayFlags.All, True, True)  # neighbours go the same way
     lit = si.is_valid() & mi.has_flag(si.bsdf(ray).flags(), mi.BSDFFlags.Smooth)
     n = mi.Vector3f(dr.mulsign(si.n, -dr.dot(si.n, ray.d)))
     shape = light.hits.surface(si, lit)
