@@ -32,11 +32,12 @@ from grimaldi.diffraction.edges import (
 from grimaldi.diffraction.frame import Frame, frame
 from grimaldi.diffraction.grazing import Near, chords, near
 from grimaldi.diffraction.hierarchy import least_detour
-from grimaldi.diffraction.listing import Search, lists
-from grimaldi.diffraction.lists import WEAK_HERE, Listed, Lists, listed_sum
+from grimaldi.diffraction.listing import lists
+from grimaldi.diffraction.lists import Listed, Lists, listed_sum
 from grimaldi.diffraction.model import OUTSIDE, Blocks, Evaluate, Factor, Grouped, Options, Receivers
 from grimaldi.diffraction.occlusion import Rays, rays
 from grimaldi.diffraction.screen import beyond
+from grimaldi.diffraction.search import Search
 from grimaldi.diffraction.segment import Rule
 from grimaldi.diffraction.table import Packed, Table, needs_double, packed
 from grimaldi.outlines.model import Outline
@@ -235,8 +236,7 @@ class _Bodies:
         receivers = receivers._replace(active=receivers.active & (receivers.block != OUTSIDE))
         fr = frame(self.problem.source, receivers.p, self.tab)
         beside = found.near(receivers, self.grazing)
-        walk = Listed(found, self.tab, receivers, self.tab.device(WEAK_HERE * self.problem.options.tolerance))
-        asked = self._sum(fr, walk, beside, receivers)
+        asked = self._sum(fr, Listed(found, self.tab, receivers), beside, receivers)
         return self._factor(fr, receivers, listed_sum(fr, found, self.tab, self.k, self.rule, asked, receivers))
 
     def _sum(self, fr: Frame, walk: Walk, beside: Near | None, receivers: Receivers) -> tuple[Sum, Nearest, Margins]:

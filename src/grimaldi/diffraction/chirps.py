@@ -68,32 +68,21 @@ def place(receivers: Receivers) -> tuple[Any, Any]:
 
 
 class Samples(NamedTuple):
-    """What each piece sends to PLACES of blocks: the wave, Δ/λ of its middle, and what that grows by from end to end;
-    and how far rays and receivers are from it."""
+    """What a piece sends along each ray: the wave, Δ/λ of its middle, and what that grows by from end to end."""
 
     real: Any
     imag: Any
     turns: Any
     spread: Any
-    ray2: Any  # squared distance
-    receiver2: Any  # the least
+    ray2: Any  # squared distance of the ray to it, and of the receiver
+    receiver2: Any
 
 
-def sampled(lattice: Frame, tab: Table, k: Any, rule: Rule, block: Any, piece: Any) -> Samples:
-    """By frames of the rays to the blocks' lattices, evaluated."""
-    F, n = tab.types.Float, dr.width(block)
-    U = dr.uint32_array_t(F)
-    index = dr.arange(U, PLACES * n)
-    of = index // PLACES
-    half = ACROSS // 2
-    places = U([int(half * (v + 1)) * LATTICE + int(half * (u + 1)) for u, v in (*GRID, *BETWEEN)])
-    at = dr.gather(U, block, of) * (LATTICE * LATTICE) + dr.gather(U, places, index - PLACES * of)
-    a, foot, z1, z2, lever = (dr.gather(type(values), values, at) for values in lattice[:5])
-    fr = Frame(a, foot, z1, z2, lever, lattice.plane)
-    own = dr.gather(U, piece, of)
-    first, end = tab.range(own)
-    chain = chain_wave(fr, tab, first, end, k, rule, None, False, dr.mask_t(F)(True))
-    middle, _ = tab.sphere(own)
+def sampled(fr: Frame, tab: Table, k: Any, rule: Rule, piece: Any) -> Samples:
+    """Evaluated."""
+    first, end = tab.range(piece)
+    chain = chain_wave(fr, tab, first, end, k, rule, None, False, dr.mask_t(k)(True))
+    middle, _ = tab.sphere(piece)
     turns = k / (2 * np.pi)
     spread = turns * (least_detour(fr, tab.corner(end - 1, 1), 0) - least_detour(fr, tab.corner(first, 0), 0))
     turns *= least_detour(fr, middle, 0)
@@ -102,65 +91,61 @@ def sampled(lattice: Frame, tab: Table, k: Any, rule: Rule, block: Any, piece: A
     return Samples(*found)
 
 
-class Fit(NamedTuple):
-    """Sums of waves as chirps, the square of what those leave of them in the mean over a block; and by how many turns
-    more the ends are apart in one of PLACES than in another, and how near rays to those pass by."""
+def lattice_place(i: Any) -> Any:
+    """Where the i-th of PLACES stands in the lattice of a block."""
+    half = ACROSS // 2
+    places = [int(half * (v + 1)) * LATTICE + int(half * (u + 1)) for u, v in (*GRID, *BETWEEN)]
+    return dr.gather(type(i), type(i)(places), i)
 
-    packets: tuple[Any, ...]
+
+class Fit(NamedTuple):
+    """Waves as chirps; over PLACES: the mean squares of them and of what chirps leave of them, by how many turns more
+    the ends are apart in one place than in another, and the least squared distance of rays."""
+
+    chirps: Chirps
+    size2: Any
     off2: Any
     beats: Any
-    ray2: Any  # squared distance
+    ray2: Any
 
 
-def fit(samples: Samples, first: Any, end: Any, types: Types) -> Fit:
-    """The sum of waves first..end, by least squares over 3 × 3 places."""
-    F = types.Float
-    sums = _summed(samples, first, end)
-    middle = first + (end - first) // 2
-    turns = _terms([dr.gather(F, samples.turns, PLACES * middle + t) for t in range(len(GRID))])
+def fit(samples: Samples, n: int, types: Types) -> Fit:
+    """n waves, each by PLACES samples; evaluated."""
+    F, index = types.Float, dr.arange(dr.uint32_array_t(types.Float), n)
+
+    def at_places(values: Any) -> list[Any]:
+        return [dr.gather(F, values, PLACES * index + t) for t in range(PLACES)]
+
+    turns = _terms(at_places(samples.turns))
     left, right = [], []
-    for (u, v), re, im in zip((*GRID, *BETWEEN), sums[:PLACES], sums[PLACES:], strict=True):
+    for (u, v), re, im in zip((*GRID, *BETWEEN), at_places(samples.real), at_places(samples.imag), strict=True):
         sin, cos = of_turns(_quadratic((0, *turns[1:]), u, v))
         left.append(re * cos + im * sin)
         right.append(im * cos - re * sin)
-    real, imag = _terms(left[: len(GRID)]), _terms(right[: len(GRID)])
-    off2 = F(0)
+    real, imag = _terms(left), _terms(right)
+    size2, off2 = F(0), F(0)
     for (u, v), re, im in zip((*GRID, *BETWEEN), left, right, strict=True):
+        size2 += re * re + im * im
         off2 += dr.square(_quadratic(real, u, v) - re) + dr.square(_quadratic(imag, u, v) - im)
+    low, high, ray2 = F(dr.inf), F(-dr.inf), F(FARTHEST)
+    for spread, distance2 in zip(at_places(samples.spread), at_places(samples.ray2), strict=True):
+        low, high, ray2 = dr.minimum(low, spread), dr.maximum(high, spread), dr.minimum(ray2, distance2)
     amplitude = [part for pair in zip(real, imag, strict=True) for part in pair]
     numbers = [*turns[1:], *amplitude, F(0), F(0), F(0)]
-    packets = tuple(types.Packet(*numbers[4 * j : 4 * j + 4]) for j in range(PACKETS))
-    low, high, ray2 = F(dr.inf), F(-dr.inf), F(FARTHEST)
-    for t in range(PLACES):
-        spread = dr.gather(F, samples.spread, PLACES * first + t)
-        low, high = dr.minimum(low, spread), dr.maximum(high, spread)
-        ray2 = dr.minimum(ray2, dr.gather(F, samples.ray2, PLACES * first + t))
-    return Fit(packets, off2 / PLACES, high - low, ray2)
-
-
-@dr.syntax
-def _summed(samples: Samples, first: Any, end: Any) -> tuple[Any, ...]:
-    """Waves first..end at PLACES: real parts, then imaginary ones."""
-    sums = tuple(type(samples.real)(0) for _ in range(2 * PLACES))
-    i = type(first)(first)
-    while i < end:
-        sums = _with(sums, samples, i)
-        i += 1
-    return sums
-
-
-def _with(sums: tuple[Any, ...], samples: Samples, i: Any) -> tuple[Any, ...]:
-    """The sums with the wave i."""
-    waves = [dr.gather(type(x), x, PLACES * i + t) for x in (samples.real, samples.imag) for t in range(PLACES)]
-    return tuple(s + wave for s, wave in zip(sums, waves, strict=True))
+    packets = dr.zeros(F, 4 * PACKETS * n)
+    for j in range(PACKETS):
+        dr.scatter(packets, types.Packet(*numbers[4 * j : 4 * j + 4]), PACKETS * index + j)
+    found = size2 / PLACES, off2 / PLACES, high - low, ray2
+    dr.eval(packets, *found)
+    return Fit(Chirps(packets, types), *found)
 
 
 def _terms(values: list[Any]) -> tuple[Any, ...]:
-    """Of the quadratic nearest to values at GRID: 1, u, v, uv, u² - 2/3 and v² - 2/3 are orthogonal there."""
+    """Of the quadratic nearest to values on the GRID: 1, u, v, uv, u² - 2/3 and v² - 2/3 are orthogonal there."""
 
     def along(term: Callable[[float, float], float]) -> Any:
         weights = [term(u, v) for u, v in GRID]
-        return sum(w * x for w, x in zip(weights, values, strict=True) if w) / sum(w * w for w in weights)
+        return sum(w * x for w, x in zip(weights, values, strict=False) if w) / sum(w * w for w in weights)
 
     of_uu, of_vv = along(lambda u, v: u * u - 2 / 3), along(lambda u, v: v * v - 2 / 3)
     one = along(lambda u, v: 1) - 2 / 3 * (of_uu + of_vv)

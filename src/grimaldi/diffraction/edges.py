@@ -236,17 +236,12 @@ class Walk(Protocol):
         """The next place."""
         ...
 
-    @property
-    def least(self) -> float:
-        """|M| that a chain cut off on a piece leaves, up to which it takes no ray."""
+    def tested(self, fr: Frame, piece: Piece, k: Any, acts: Any) -> tuple[Any, Any]:
+        """Which pieces of those that act take a ray, and what |M| the others may be wrong by."""
         ...
 
-    def weight(self, fr: Frame, i: Any, piece: Piece, tested: Any) -> Any:
-        """What the wave of the piece at a place counts, where that takes a ray or not."""
-        ...
-
-    def unasked(self, left: Any) -> Any:
-        """What may be wrong where a piece takes no ray that leaves so much."""
+    def weight(self, fr: Frame, piece: Piece) -> Any:
+        """What the wave of a piece counts."""
         ...
 
     def chain(
@@ -286,13 +281,15 @@ class Everywhere(NamedTuple):
     def after(self, i: Any, inside: Any) -> Any:
         return self.table.tree.after(i, inside)
 
-    def weight(self, fr: Frame, i: Any, piece: Piece, tested: Any) -> Any:
+    def tested(self, fr: Frame, piece: Piece, k: Any, acts: Any) -> tuple[Any, Any]:
+        """All but those that would leave less than `least` where a chain is cut off on them."""
+        left = cut_off(fr, piece, k)
+        tested = acts & (left > self.least)
+        return tested, dr.select(acts & ~tested, left, 0)
+
+    def weight(self, fr: Frame, piece: Piece) -> Any:
         """By how near the ray it lies."""
         return taper(least_detour(fr, piece.middle, 0) / self.table.far)
-
-    def unasked(self, left: Any) -> Any:
-        """All of it: a piece reaches a receiver or not."""
-        return left
 
     def chain(
         self, fr: Frame, i: Any, piece: Piece, k: Any, rule: Rule, passed: Passed | None, smooth: bool, active: Any
@@ -345,13 +342,12 @@ def body_sum(
         if receivers.active & taken:
             piece = tab.piece(item)
             acts = sounds(fr, piece, n)
-            visible, tested = dr.mask_t(F)(acts), dr.mask_t(F)(acts)
+            visible = dr.mask_t(F)(acts)
             past_real, past_imag = F(0), F(0)
             if dr.hint(probe is not None, mode="scalar"):
                 assert probe is not None
-                left = cut_off(fr, piece, k)
-                tested &= left > walk.least
-                unasked += dr.select(acts & ~tested, walk.unasked(left), 0)
+                tested, left = walk.tested(fr, piece, k, acts)
+                unasked += left
                 if tested:
                     x = mi.Point3f(piece.middle + constant(tab.types.Vector, tab.centre))
                     visible = acts & probe.reaches(x, piece, p, tested)
@@ -364,7 +360,7 @@ def body_sum(
                     if close:
                         past_real, past_imag = grazed(fr, beside.silhouettes, piece, body, visible, k, close)
                 acts = visible | (past_real != 0) | (past_imag != 0)
-            weight = walk.weight(fr, i, piece, tested)
+            weight = walk.weight(fr, piece)
             acts &= weight > 0
             passed = Passed(visible, past_real, past_imag) if beside is not None else None
             chain = walk.chain(fr, i, piece, k, rule, passed, smooth, acts)

@@ -13,18 +13,16 @@ import drjit as dr
 import mitsuba
 import numpy as np
 
-from grimaldi.diffraction.chirps import FARTHEST, PACKETS, PLACES, Chirps, Samples, fit, sampled
 from grimaldi.diffraction.corners import Corner, corner, slopes
 from grimaldi.diffraction.edges import cut_off, sounds
 from grimaldi.diffraction.frame import Frame, constant, frame
-from grimaldi.diffraction.grazing import Chords, Near, near, other_than, worth
+from grimaldi.diffraction.grazing import Near, near, other_than, worth
 from grimaldi.diffraction.hierarchy import NONE, least_detour
 from grimaldi.diffraction.lists import List, Lists, Parts, Runs, places
 from grimaldi.diffraction.model import ACROSS, LATTICE, Blocks, Receivers
-from grimaldi.diffraction.occlusion import Rays
-from grimaldi.diffraction.segment import Corners, Rule
+from grimaldi.diffraction.search import Pairs, Search, some_of
 from grimaldi.diffraction.table import Piece, Table
-from grimaldi.scene.model import Source
+from grimaldi.diffraction.waves import Waves, waves
 
 mi: Any = mitsuba  # the stubs refuse numbers where arrays are asked for
 
@@ -33,41 +31,12 @@ AVERAGED = 0.05  # at this tolerance and above; below, more in proportion
 CORNER = 0.007  # of the tolerance: |M| of a corner that is left out
 FINE = 1 << 16  # parts of its square, in which it is counted: sums of whole numbers are the same in any order
 WEAK = 0.3  # of the tolerance: |M| of an end that grows evenly between corners of cells which it reaches or not
+FAINT = 0.2  # and of one at all four corners of a cell
 REMOTE = 1.5  # radii of a block, that such a piece is away from it at least
 ALL = (1 << ACROSS * ACROSS) - 1  # cells
 EVERY = (1 << LATTICE * LATTICE) - 1  # corners
 COARSE = sum(1 << (y * LATTICE + x) for y in range(0, LATTICE, 2) for x in range(0, LATTICE, 2))  # every other corner
-FITS = 0.006  # of the tolerance: what chirps may leave of a piece's wave in the mean over a block
-BEATS = 2.0  # turns, by which a piece's ends may be further apart in one place of a block than in another: beats from
-# place to place would look like none,
-AWAY = 1.0  # radii of a block, that rays to it pass by the piece at least: waves beside a ray change within pixels
 UNTESTED = 0.1  # of the tolerance: |M| of an end that reaches a block or not as a whole, by what its middle says
-
-
-class Search(NamedTuple):
-    """What is asked of pieces: the outlines, in Float32 or Float64, and what is allowed to be left out of M.
-
-    share: |M| below which a piece reaches all without a test; probe: rays X→P, None where nothing blocks them; grazing:
-    silhouettes that X→P may graze.
-    """
-
-    source: Source
-    tab: Table
-    k: Any
-    rule: Rule
-    corners: Corners
-    tolerance: float
-    share: float
-    probe: Rays | None
-    grazing: Chords | None
-
-
-class _Pairs(NamedTuple):
-    """Blocks and pieces, each of which may act in the other."""
-
-    block: Any
-    piece: Any
-    index: Any  # of the pair among all
 
 
 class _Seen(NamedTuple):
@@ -125,14 +94,14 @@ def lists(search: Search, blocks: Blocks) -> Lists:
     first, end = tab.range(pairs.piece)
     lattice = _frames(search, blocks.lattice)
     verdicts = _verdicts(search, blocks, lattice, pairs, tested, seen)
-    flat = dr.gather(mi.Float, blocks.bend, pairs.block) == 0
-    waves = _chirps(search, blocks, lattice, pairs, flat & (kept | ((verdicts[0] | verdicts[1]) != 0)))
-    everywhere = kept & (waves.index != NONE)
-    left2 += dr.select(everywhere, dr.gather(mi.Float, waves.off2, waves.index, everywhere), 0)
+    found = waves(search, blocks, frames, lattice, pairs, kept | ((verdicts[0] | verdicts[1]) != 0))
+    kept &= ~found.small
+    everywhere = kept & (found.index != NONE)
+    left2 += dr.select(everywhere, dr.gather(mi.Float, found.off2, found.index, everywhere), 0)
     left = dr.zeros(mi.UInt64, number)
     dr.scatter_add(left, mi.UInt64(dr.ceil(left2 / unit)), pairs.block)
     dr.eval(begins, stops, first, end, everywhere)
-    asked, asked_chirps, partly, whole, chirped = _in_cells(search, pairs, number, verdicts, waves, seen.passes)
+    asked, asked_chirps, partly, whole, chirped = _in_cells(search, pairs, number, verdicts, found, seen.passes)
     return Lists(
         dr.opaque(mi.UInt32, number),
         asked,
@@ -140,13 +109,14 @@ def lists(search: Search, blocks: Blocks) -> Lists:
         partly,
         whole,
         _runs(tab, pairs.piece, kept & ~everywhere, follows, pairs.block, number),
-        waves.chirps,
+        found.chirps,
         chirped,
-        List.of(everywhere, pairs.block, number, waves.index),
-        *_nearest(waves, pairs, number),
+        List.of(everywhere, pairs.block, number, found.index),
+        found.clear,
+        found.receiver2,
         List.of(begins & strong[0], pairs.block, number, first),
         List.of(stops & strong[1], pairs.block, number, end - 1),
-        dr.sqrt(mi.Float(left) * unit) / (2 * np.pi),
+        dr.sqrt(mi.Float(left) * unit) / (2 * np.pi) + found.left,
         beside,
     )
 
@@ -169,62 +139,12 @@ def _runs(tab: Table, piece: Any, taken: Any, follows: Any, place: Any, number: 
     return Runs(of(taken & ~along, items=first), of(taken & ~_of_next(along), items=end - 1))
 
 
-class _Waves(NamedTuple):
-    """Which pairs' waves are chirps."""
-
-    pair: Any  # whose waves are looked at
-    samples: Samples
-    chirps: Chirps
-    index: Any  # of the chirp of each pair; NONE if it has none
-    off2: Any  # of each chirp
-
-
-def _chirps(search: Search, blocks: Blocks, lattice: Frame, pairs: _Pairs, wanted: Any) -> _Waves:
-    """Those of the wanted pairs whose waves are chirps."""
-    tab = search.tab
-    index = dr.full(mi.UInt32, NONE, len(wanted))
-    pair = places(wanted)
-    block, piece = (dr.gather(mi.UInt32, of, pair) for of in pairs[:2])
-    samples = sampled(lattice, tab, search.k, search.rule, block, piece)
-    first = dr.arange(mi.UInt32, len(pair))
-    found = fit(samples, first, first + 1, tab.types)
-    fits = (found.off2 < (FITS * 2 * np.pi * search.tolerance) ** 2) & (found.beats < BEATS)
-    fits &= found.ray2 > dr.square(AWAY * dr.gather(mi.Float, blocks.radius, block))
-    dr.scatter(index, first, pair, fits)
-    packets = dr.zeros(tab.types.Float, 4 * PACKETS * len(pair))
-    for j, packet in enumerate(found.packets):
-        dr.scatter(packets, packet, PACKETS * first + j)
-    dr.eval(index, packets, found.off2)
-    return _Waves(pair, samples, Chirps(packets, tab.types), index, found.off2)
-
-
-@dr.syntax
-def _nearest(waves: _Waves, pairs: _Pairs, number: int) -> tuple[Any, Any]:
-    """The least distances to what may send chirps: of rays to PLACES of blocks, and the squares of blocks' own."""
-    n, samples = len(waves.pair), waves.samples
-    of = List.of(
-        dr.full(mi.Bool, True, n), dr.gather(mi.UInt32, pairs.block, waves.pair), number, dr.arange(mi.UInt32, n)
-    )
-    index = dr.arange(mi.UInt32, number * PLACES)
-    block = index // PLACES
-    ray2, receiver2 = mi.Float(FARTHEST), mi.Float(FARTHEST)
-    i, end = of.bounds(block, mi.Bool(True))
-    while i < end:
-        at = PLACES * i + index % PLACES
-        ray2 = dr.minimum(ray2, mi.Float(dr.gather(type(samples.ray2), samples.ray2, at)))
-        receiver2 = dr.minimum(receiver2, mi.Float(dr.gather(type(samples.receiver2), samples.receiver2, at)))
-        i += 1
-    clear = dr.sqrt(ray2)
-    dr.eval(clear, receiver2)
-    return clear, receiver2
-
-
 def _in_cells(
-    search: Search, pairs: _Pairs, number: int, verdicts: tuple[Any, Any], waves: _Waves, passes: Any
-) -> tuple[Parts, Any, Parts, Runs, Parts]:
+    search: Search, pairs: Pairs, number: int, verdicts: tuple[Any, Any], found: Waves, passes: Any
+) -> tuple[List, Any, Parts, Runs, Parts]:
     """Those lists of cells of `number` blocks that `Lists` has, by what `_verdicts` says of pairs."""
     tab, cells = search.tab, ACROSS * ACROSS
-    pair = places((verdicts[0] | verdicts[1]) != 0)
+    pair = places(((verdicts[0] | verdicts[1]) != 0) & ~found.small)
     asked, reached, block, piece = (dr.gather(mi.UInt32, v, pair) for v in (*verdicts, pairs.block, pairs.piece))
     dr.eval(asked, reached, block, piece)
     count = dr.opaque(mi.UInt32, len(pair))
@@ -243,7 +163,7 @@ def _in_cells(
     follows &= dr.gather(mi.UInt32, block, before) == dr.gather(mi.UInt32, block, entry)
     place = cell * dr.opaque(mi.UInt32, number) + dr.gather(mi.UInt32, block, entry)
     of = dr.gather(mi.UInt32, pair, entry)
-    chirp = dr.gather(mi.UInt32, waves.index, of)
+    chirp = dr.gather(mi.UInt32, found.index, of)
     by_chirp = dr.select(dr.gather(mi.Bool, passes, of), NONE, chirp)  # what passes silhouettes is told apart by sides
     reaches, told = ~asks & (corners > 0), chirp != NONE
     dr.eval(chirp, by_chirp, reaches, told, place, own, follows)
@@ -252,7 +172,7 @@ def _in_cells(
         return Parts(List.of(chosen, place, cells * number, items), dr.gather(mi.UInt32, corners, places(chosen)))
 
     return (
-        parts(asks, own),
+        List.of(asks, place, cells * number, own),
         dr.gather(mi.UInt32, by_chirp, places(asks)),
         parts(reaches & ~whole & ~told, own),
         _runs(tab, own, whole & ~told, follows, place, cells * number),
@@ -267,17 +187,17 @@ def _frames(search: Search, p: Any) -> Frame:
     return frames
 
 
-def _pairs(search: Search, blocks: Blocks, frames: Frame, n: int) -> _Pairs:
+def _pairs(search: Search, blocks: Blocks, frames: Frame, n: int) -> Pairs:
     """Which of n pieces may act somewhere in a block: within the outlines' reach, and above some horizon."""
     tab, F = search.tab, search.tab.types.Float
     index = dr.arange(mi.UInt32, dr.width(blocks.p) * n)
     block = index // n
     middle, reach = tab.sphere(index - block * n)
-    detour = least_detour(_of(frames, block), middle, reach + F(dr.gather(mi.Float, blocks.radius, block)))
+    detour = least_detour(some_of(frames, block), middle, reach + F(dr.gather(mi.Float, blocks.radius, block)))
     found = places(dr.gather(mi.Bool, blocks.active, block) & (detour <= tab.far))
 
     block = found // n
-    piece, fr = tab.piece(found - block * n), _of(frames, block)
+    piece, fr = tab.piece(found - block * n), some_of(frames, block)
     radius, bend = (F(dr.gather(mi.Float, of, block)) for of in (blocks.radius, blocks.bend))
     normal = tab.types.Vector(dr.gather(type(blocks.n), blocks.n, block))
     d = fr.foot + fr.z2 * fr.a - piece.middle
@@ -286,13 +206,7 @@ def _pairs(search: Search, blocks: Blocks, frames: Frame, n: int) -> _Pairs:
     found = dr.gather(mi.UInt32, found, places(acts))
     block = found // n
     dr.eval(found, block)
-    return _Pairs(block, found - block * n, found)
-
-
-def _of(frames: Frame, some: Any) -> Frame:
-    """Some of the frames."""
-    a, foot, z1, z2, lever = (dr.gather(type(values), values, some) for values in frames[:5])
-    return Frame(a, foot, z1, z2, lever, frames.plane)
+    return Pairs(block, found - block * n, found)
 
 
 def _finest(fr: Frame, k: Any, blocks: Blocks, block: Any, piece: Piece) -> Any:
@@ -328,7 +242,7 @@ def _beside(search: Search, blocks: Blocks, frames: Frame) -> Near | None:
     return found
 
 
-def _look(search: Search, blocks: Blocks, frames: Frame, pairs: _Pairs, beside: Near | None) -> _Seen:
+def _look(search: Search, blocks: Blocks, frames: Frame, pairs: Pairs, beside: Near | None) -> _Seen:
     """Each piece from the middle of its block."""
     V = search.tab.types.Vector
     p = dr.gather(type(blocks.p), blocks.p, pairs.block)
@@ -340,7 +254,7 @@ def _look(search: Search, blocks: Blocks, frames: Frame, pairs: _Pairs, beside: 
     by = None
     if beside is not None and search.grazing is not None:
         by = beside.of(pairs.block, mi.Bool(True), search.grazing)
-    found = _from_middle(search, _of(frames, pairs.block), pairs.piece, x, V(normal), radius, by)
+    found = _from_middle(search, some_of(frames, pairs.block), pairs.piece, x, V(normal), radius, by)
     open_, idle, weak, far, inner2, start, stop, passes = found
     seen = _Seen(open_, idle, weak, far, mi.Float(inner2), mi.Float(start), mi.Float(stop), passes)
     dr.eval(*seen)
@@ -411,9 +325,7 @@ def _along(search: Search, fr: Frame, piece: Piece, radius: Any) -> tuple[Any, .
     return far, inner2, start, stop
 
 
-def _verdicts(
-    search: Search, blocks: Blocks, frames: Frame, pairs: _Pairs, tested: Any, seen: _Seen
-) -> tuple[Any, Any]:
+def _verdicts(search: Search, blocks: Blocks, frames: Frame, pairs: Pairs, tested: Any, seen: _Seen) -> tuple[Any, Any]:
     """Of pieces that are `tested`, the cells of blocks where to ask for them, and the corners of cells they reach.
 
     By a ray to each corner. A cell is to be asked where its corners differ, if the piece is not too weak for that, or
@@ -434,18 +346,37 @@ def _verdicts(
     bits = dr.select(bits == first, members, bits)
     bits |= _reached(search, blocks, frames, pairs, pair, dr.select(differ, members & ~first, 0))
     filled, known = _filled(bits, members)
+    passes = dr.gather(mi.Bool, seen.passes, pair)
+    strong = ~weak & (((bits != 0) & (bits != members)) | (members != EVERY) | passes)
+    faint = dr.select(weak, EVERY, _faint(search, frames, pairs, pair, strong))
     ask = mi.UInt32(0)
     for y in range(ACROSS):
         for x in range(ACROSS):
             own = sum(1 << ((y + dy) * LATTICE + x + dx) for dy in (0, 1) for dx in (0, 1))
             same = ((bits & own) == own) | ((bits & own) == 0)
-            tells = dr.select(weak, (known & own) == own, same & ((members & own) == own))
+            clear = ~passes & same & ((members & own) == own)
+            tells = dr.select((faint & own) == own, (known & own) == own, clear)
             ask |= dr.select(tells, 0, 1 << (y * ACROSS + x))
-    bits = dr.select(weak, filled, bits)
-    dr.scatter(asked, dr.select(dr.gather(mi.Bool, seen.passes, pair), ALL, ask), pair)
-    dr.scatter(reached, bits, pair)
+    dr.scatter(asked, ask, pair)
+    dr.scatter(reached, filled, pair)
     dr.eval(asked, reached)
     return asked, reached
+
+
+def _faint(search: Search, frames: Frame, pairs: Pairs, pair: Any, some: Any) -> Any:
+    """At which corners of cells a chain cut off on the pieces of some pairs leaves little; a bit for each."""
+    tab, corners = search.tab, LATTICE * LATTICE
+    bits = dr.zeros(mi.UInt32, len(pair))
+    some = places(some)
+    index = dr.arange(mi.UInt32, len(some) * corners)
+    of = index // corners
+    place, entry = index - of * corners, dr.gather(mi.UInt32, some, of)
+    own = dr.gather(mi.UInt32, pair, entry)
+    at = dr.gather(mi.UInt32, pairs.block, own) * corners + place
+    left = cut_off(some_of(frames, at), tab.piece(dr.gather(mi.UInt32, pairs.piece, own)), search.k)
+    dr.scatter_add(bits, dr.select(left < FAINT * search.tolerance, mi.UInt32(1) << place, 0), entry)
+    dr.eval(bits)
+    return bits
 
 
 def _filled(bits: Any, members: Any) -> tuple[Any, Any]:
@@ -461,7 +392,7 @@ def _filled(bits: Any, members: Any) -> tuple[Any, Any]:
     return (bits & members) | (beside(bits & members) & ~members), known
 
 
-def _reached(search: Search, blocks: Blocks, frames: Frame, pairs: _Pairs, pair: Any, asked: Any) -> Any:
+def _reached(search: Search, blocks: Blocks, frames: Frame, pairs: Pairs, pair: Any, asked: Any) -> Any:
     """Which of the `asked` corners of cells the pieces of pairs reach; a bit for each."""
     tab, probe, corners = search.tab, search.probe, LATTICE * LATTICE
     assert probe is not None
@@ -474,7 +405,7 @@ def _reached(search: Search, blocks: Blocks, frames: Frame, pairs: _Pairs, pair:
     p = dr.gather(type(blocks.lattice), blocks.lattice, at)
     n = dr.gather(type(blocks.normals), blocks.normals, at)
     piece = tab.piece(dr.gather(mi.UInt32, pairs.piece, own))
-    acts = sounds(_of(frames, at), piece, tab.types.Vector(n))
+    acts = sounds(some_of(frames, at), piece, tab.types.Vector(n))
     x = mi.Point3f(piece.middle + constant(tab.types.Vector, tab.centre))
     q = mi.Point3f(p)
     acts &= probe.reaches(x, piece, q + probe.epsilon(q) * n, acts)

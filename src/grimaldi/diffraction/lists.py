@@ -25,8 +25,6 @@ from grimaldi.diffraction.table import Piece, Table
 
 mi: Any = mitsuba  # the stubs refuse numbers where arrays are asked for
 
-WEAK_HERE = 0.2  # of the tolerance: |M| of an end at a receiver, of whatever piece, that takes no ray
-
 
 class List(NamedTuple):
     """Items of each block, one block after the other."""
@@ -88,7 +86,7 @@ class Lists(NamedTuple):
     """
 
     blocks: Any  # how many
-    asked: Parts  # of cells: pieces that each receiver asks for; their corners count where it takes no ray
+    asked: List  # of cells: pieces that each receiver asks for
     asked_chirps: Any  # of each of these, what tells its wave; NONE where its segments do
     partly: Parts  # of cells: pieces that reach it in part
     whole: Runs  # of cells: those of pieces that reach it, but not all of the block as far as is known
@@ -120,25 +118,23 @@ class Listed(NamedTuple):
     lists: Lists
     table: Table
     receivers: Receivers
-    least: Any
 
     def bounds(self, receivers: Receivers) -> tuple[Any, Any]:
-        return self.lists.asked.pieces.bounds(self.lists.cell(receivers), receivers.active)
+        return self.lists.asked.bounds(self.lists.cell(receivers), receivers.active)
 
     def visit(self, fr: Frame, i: Any) -> tuple[Any, Any, Any]:
         always = dr.mask_t(fr.z2)(True)
-        return self.lists.asked.pieces.item(i), always, always
+        return self.lists.asked.item(i), always, always
 
     def after(self, i: Any, inside: Any) -> Any:
         return i + 1
 
-    def weight(self, fr: Frame, i: Any, piece: Piece, tested: Any) -> Any:
-        """Without a ray by the corners of the cell."""
-        return dr.select(tested, 1, type(fr.z2)(self.lists.asked.share(i, self.receivers)))
+    def tested(self, fr: Frame, piece: Piece, k: Any, acts: Any) -> tuple[Any, Any]:
+        """All: others are on no such list."""
+        return acts, 0
 
-    def unasked(self, left: Any) -> Any:
-        """Nothing: that such pieces grow evenly is part of the tolerance."""
-        return type(left)(0)
+    def weight(self, fr: Frame, piece: Piece) -> Any:
+        return 1
 
     @dr.syntax
     def chain(

@@ -1,0 +1,113 @@
+"""What pieces send to blocks: which waves are chirps there, and which are too small to be told at all."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import drjit as dr
+import mitsuba
+import numpy as np
+
+from grimaldi.diffraction.chirps import FARTHEST, PLACES, Chirps, Samples, fit, lattice_place, sampled
+from grimaldi.diffraction.frame import Frame
+from grimaldi.diffraction.hierarchy import NONE
+from grimaldi.diffraction.lists import List, places
+from grimaldi.diffraction.model import LATTICE, Blocks
+from grimaldi.diffraction.search import Pairs, Search, some_of
+
+mi: Any = mitsuba  # the stubs refuse numbers where arrays are asked for
+
+FITS = 0.005  # of the tolerance: what chirps may leave of a piece's wave in the mean over a block
+BEATS = 3.0  # turns, by which a piece's ends may be further apart in one place of a block than in another: beats from
+# place to place would look like none,
+AWAY = 0.7  # radii of a block, that rays to it pass by the piece at least: waves beside a ray change within pixels
+OFF = 2.0  # likewise, of a curved one, whose receivers may lie anywhere in a ball
+SMALL = 0.05  # of the tolerance: the sum of |M| of waves that are left out
+STEPS = 8  # powers of two that are tried as the largest of these
+PARTS = 1 << 16  # of that sum, in which it is counted: sums of whole numbers are the same in any order
+
+
+class Waves(NamedTuple):
+    """What is known of pairs' waves, and how near their pieces are to blocks."""
+
+    chirps: Chirps
+    index: Any  # of the chirp of each pair; NONE if it has none
+    off2: Any  # of each chirp, as in `Fit`
+    small: Any  # which of the pairs are left out
+    left: Any  # of each block: what is left out of |M|
+    clear: Any  # least distance to pieces that may send chirps: of the rays to PLACES of each block
+    receiver2: Any  # and of those places themselves, squared
+
+
+def waves(search: Search, blocks: Blocks, frames: Frame, lattice: Frame, pairs: Pairs, wanted: Any) -> Waves:
+    """Of the wanted pairs; frames: of the rays to the middles of blocks, and to their lattices."""
+    tab, k, rule, number = search.tab, search.k, search.rule, dr.width(blocks.p)
+    unit = 2 * np.pi * search.tolerance
+    curved = dr.gather(mi.Float, blocks.bend, pairs.block) > 0
+    radius = dr.gather(mi.Float, blocks.radius, pairs.block)
+    size = dr.full(mi.Float, dr.inf, len(wanted))
+
+    some = wanted & curved
+    pair = places(some)
+    block, piece = (dr.gather(mi.UInt32, of, pair) for of in pairs[:2])
+    there = sampled(some_of(frames, block), tab, k, rule, piece)
+    apart = there.ray2 > dr.square(OFF * dr.gather(mi.Float, radius, pair))
+    modulus = dr.sqrt(dr.square(there.real) + dr.square(there.imag))
+    dr.scatter(size, mi.Float(modulus), pair, apart & dr.gather(mi.Bool, some, pair))
+
+    some = wanted & ~curved
+    pair = places(some)
+    n = len(pair)
+    block, piece = (dr.gather(mi.UInt32, of, pair) for of in pairs[:2])
+    index = dr.arange(mi.UInt32, PLACES * n)
+    of = index // PLACES
+    at = dr.gather(mi.UInt32, block, of) * (LATTICE * LATTICE) + lattice_place(index - PLACES * of)
+    samples = sampled(some_of(lattice, at), tab, k, rule, dr.gather(mi.UInt32, piece, of))
+    found = fit(samples, n, tab.types)
+    apart = dr.gather(mi.Bool, some, pair) & (found.ray2 > dr.square(AWAY * dr.gather(mi.Float, radius, pair)))
+    dr.scatter(size, mi.Float(dr.sqrt(found.size2)), pair, apart)
+    chirp = dr.full(mi.UInt32, NONE, len(wanted))
+    fits = apart & (found.off2 < (FITS * unit) ** 2) & (found.beats < BEATS)
+    dr.scatter(chirp, dr.arange(mi.UInt32, n), pair, fits)
+    small, left = _small(size / (SMALL * unit), pairs.block, number)
+    near = _nearest(samples, block, number)
+    return Waves(found.chirps, chirp, found.off2, small, SMALL * search.tolerance * left, *near)
+
+
+def _small(size: Any, block: Any, number: int) -> tuple[Any, Any]:
+    """Which of the sizes are so small that all of them together make no more than 1 in each block; their sums."""
+    parts = mi.UInt32(dr.minimum(dr.ceil(size * PARTS), PARTS))
+    limit = dr.zeros(mi.UInt32, number)
+    for step in range(1, STEPS + 1):
+        most = PARTS >> step
+        limit = dr.maximum(limit, dr.select(_sums(parts, block, number, parts <= most) <= PARTS, most, 0))
+    small = parts <= dr.gather(mi.UInt32, limit, block)
+    left = mi.Float(_sums(parts, block, number, small)) / PARTS
+    dr.eval(small, left)
+    return small, left
+
+
+def _sums(parts: Any, block: Any, number: int, some: Any) -> Any:
+    """Of each block."""
+    total = dr.zeros(mi.UInt64, number)
+    dr.scatter_add(total, mi.UInt64(parts), block, some)
+    return total
+
+
+@dr.syntax
+def _nearest(samples: Samples, block: Any, number: int) -> tuple[Any, Any]:
+    """`clear` and `receiver2` of `Waves`."""
+    n = len(block)
+    of = List.of(dr.full(mi.Bool, True, n), block, number, dr.arange(mi.UInt32, n))
+    index = dr.arange(mi.UInt32, number * PLACES)
+    own = index // PLACES
+    ray2, receiver2 = mi.Float(FARTHEST), mi.Float(FARTHEST)
+    i, end = of.bounds(own, mi.Bool(True))
+    while i < end:
+        at = PLACES * i + index % PLACES
+        ray2 = dr.minimum(ray2, mi.Float(dr.gather(type(samples.ray2), samples.ray2, at)))
+        receiver2 = dr.minimum(receiver2, mi.Float(dr.gather(type(samples.receiver2), samples.receiver2, at)))
+        i += 1
+    clear = dr.sqrt(ray2)
+    dr.eval(clear, receiver2)
+    return clear, receiver2
