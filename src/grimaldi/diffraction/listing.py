@@ -101,13 +101,12 @@ def lists(search: Search, blocks: Blocks) -> Lists:
     left = dr.zeros(mi.UInt64, number)
     dr.scatter_add(left, mi.UInt64(dr.ceil(left2 / unit)), pairs.block)
     dr.eval(begins, stops, first, end, everywhere)
-    asked, asked_chirps, partly, whole, chirped = _in_cells(search, pairs, number, verdicts, found, seen.passes)
+    asked, asked_chirps, partly, chirped = _in_cells(pairs, number, verdicts, found, seen.passes)
     return Lists(
         dr.opaque(mi.UInt32, number),
         asked,
         asked_chirps,
         partly,
-        whole,
         _runs(tab, pairs.piece, kept & ~everywhere, follows, pairs.block, number),
         found.chirps,
         chirped,
@@ -140,10 +139,10 @@ def _runs(tab: Table, piece: Any, taken: Any, follows: Any, place: Any, number: 
 
 
 def _in_cells(
-    search: Search, pairs: Pairs, number: int, verdicts: tuple[Any, Any], found: Waves, passes: Any
-) -> tuple[List, Any, Parts, Runs, Parts]:
+    pairs: Pairs, number: int, verdicts: tuple[Any, Any], found: Waves, passes: Any
+) -> tuple[List, Any, Parts, Parts]:
     """Those lists of cells of `number` blocks that `Lists` has, by what `_verdicts` says of pairs."""
-    tab, cells = search.tab, ACROSS * ACROSS
+    cells = ACROSS * ACROSS
     pair = places(((verdicts[0] | verdicts[1]) != 0) & ~found.small)
     asked, reached, block, piece = (dr.gather(mi.UInt32, v, pair) for v in (*verdicts, pairs.block, pairs.piece))
     dr.eval(asked, reached, block, piece)
@@ -154,19 +153,13 @@ def _in_cells(
     bits = dr.gather(mi.UInt32, reached, entry) >> ((cell // ACROSS) * LATTICE + cell % ACROSS)
     corners = (bits & 3) | ((bits >> (LATTICE - 2)) & 12)
     asks = ((dr.gather(mi.UInt32, asked, entry) >> cell) & 1) != 0
-    whole = ~asks & (corners == 15)
     own = dr.gather(mi.UInt32, piece, entry)
-    dr.eval(corners, asks, whole)
-    before = dr.maximum(entry, 1) - 1  # in the same cell
-    follows = dr.gather(mi.Bool, tab.follows, own) & (entry > 0)
-    follows &= dr.gather(mi.UInt32, piece, before) + 1 == own
-    follows &= dr.gather(mi.UInt32, block, before) == dr.gather(mi.UInt32, block, entry)
     place = cell * dr.opaque(mi.UInt32, number) + dr.gather(mi.UInt32, block, entry)
     of = dr.gather(mi.UInt32, pair, entry)
     chirp = dr.gather(mi.UInt32, found.index, of)
     by_chirp = dr.select(dr.gather(mi.Bool, passes, of), NONE, chirp)  # what passes silhouettes is told apart by sides
     reaches, told = ~asks & (corners > 0), chirp != NONE
-    dr.eval(chirp, by_chirp, reaches, told, place, own, follows)
+    dr.eval(corners, asks, chirp, by_chirp, reaches, told, place, own)
 
     def parts(chosen: Any, items: Any) -> Parts:
         return Parts(List.of(chosen, place, cells * number, items), dr.gather(mi.UInt32, corners, places(chosen)))
@@ -174,8 +167,7 @@ def _in_cells(
     return (
         List.of(asks, place, cells * number, own),
         dr.gather(mi.UInt32, by_chirp, places(asks)),
-        parts(reaches & ~whole & ~told, own),
-        _runs(tab, own, whole & ~told, follows, place, cells * number),
+        parts(reaches & ~told, own),
         parts(reaches & told, chirp),
     )
 

@@ -88,8 +88,7 @@ class Lists(NamedTuple):
     blocks: Any  # how many
     asked: List  # of cells: pieces that each receiver asks for
     asked_chirps: Any  # of each of these, what tells its wave; NONE where its segments do
-    partly: Parts  # of cells: pieces that reach it in part
-    whole: Runs  # of cells: those of pieces that reach it, but not all of the block as far as is known
+    partly: Parts  # of cells: pieces that reach it, or a part of it, but not all of the block as far as is known
     runs: Runs  # of blocks
     chirps: Chirps
     chirped: Parts  # of cells: those that reach it
@@ -263,7 +262,6 @@ def listed_sum(
 
     total: tuple[Any, ...] = (*sums[:5], F(margins.receiver2), F(nearest.distance2), nearest.segment)
     total = _of_parts(total, found.partly, tab, tell, receivers, cell)
-    total = _of_runs(total, found.whole, tell, active, cell)
     total = _of_runs(total, found.runs, tell, active, block)
     real, imag, err_real, err_imag, rounding2, receiver2, nearest2, segment = total
     for ends, stop in ((found.begins, 0), (found.stops, 1)):
