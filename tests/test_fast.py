@@ -187,6 +187,17 @@ def test_chirps_tell_what_the_segments_of_pieces_do(monkeypatch):
     assert np.sqrt((off**2).mean()) < 0.1 * tolerance
 
 
+def test_lists_are_the_same_in_both_precisions():
+    floor = Floor(2e-2, "none")
+    places = np.random.default_rng(1).uniform(0, 64, (2, 2000))
+    single, _ = floor.both(floor.film, *places)
+    floor.light = prepare(
+        floor.scene, Settings(wavelength=scenes.WAVELENGTH, tolerance=2e-2, occlusion="none", precision="double")
+    )
+    double, _ = floor.both(floor.film, *places)
+    assert 0 < abs(single - double).max() < 0.1 * 2e-2
+
+
 def test_waves_are_left_out_as_long_as_all_of_them_make_little(monkeypatch):
     tolerance = 5e-2
     monkeypatch.setattr(scenes, "WAVELENGTH", 2.0)

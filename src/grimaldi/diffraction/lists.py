@@ -198,7 +198,8 @@ def _of_chirps(found: Lists, receivers: Receivers, at: Any) -> tuple[Any, Any]:
     """What is told by chirps, of the receivers' blocks and of their cells at places of lists."""
     u, v = place(receivers)
     active = receivers.active
-    real, imag = mi.Float(0), mi.Float(0)
+    F = found.chirps.types.Float
+    real, imag = F(0), F(0)
     i, end = found.everywhere.bounds(receivers.block, active)
     while active & (i < end):
         re, im = found.chirps.at(found.everywhere.item(i), u, v)
@@ -206,7 +207,7 @@ def _of_chirps(found: Lists, receivers: Receivers, at: Any) -> tuple[Any, Any]:
         i += 1
     i, end = found.chirped.pieces.bounds(at, active)
     while active & (i < end):
-        weight = found.chirped.share(i, receivers)
+        weight = F(found.chirped.share(i, receivers))
         re, im = found.chirps.at(found.chirped.pieces.item(i), u, v)
         real, imag = dr.fma(weight, re, real), dr.fma(weight, im, imag)
         i += 1

@@ -71,7 +71,7 @@ def waves(search: Search, blocks: Blocks, frames: Frame, lattice: Frame, pairs: 
     dr.scatter(chirp, dr.arange(mi.UInt32, n), pair, fits)
     small, left = _small(size / (SMALL * unit), pairs.block, number)
     near = _nearest(samples, block, number)
-    return Waves(found.chirps, chirp, found.off2, small, SMALL * search.tolerance * left, *near)
+    return Waves(found.chirps, chirp, mi.Float(found.off2), small, SMALL * search.tolerance * left, *near)
 
 
 def _small(size: Any, block: Any, number: int) -> tuple[Any, Any]:
