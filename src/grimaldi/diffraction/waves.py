@@ -14,6 +14,8 @@ from grimaldi.diffraction.hierarchy import NONE
 from grimaldi.diffraction.lists import List, places
 from grimaldi.diffraction.model import LATTICE, Blocks
 from grimaldi.diffraction.search import Pairs, Search, some_of
+from grimaldi.diffraction.segment import Rule
+from grimaldi.diffraction.table import Table
 
 mi: Any = mitsuba  # the stubs refuse numbers where arrays are asked for
 
@@ -41,37 +43,46 @@ class Waves(NamedTuple):
 
 def waves(search: Search, blocks: Blocks, frames: Frame, lattice: Frame, pairs: Pairs, wanted: Any) -> Waves:
     """Of the wanted pairs; frames: of the rays to the middles of blocks, and to their lattices."""
-    tab, k, rule, number = search.tab, search.k, search.rule, dr.width(blocks.p)
-    unit = 2 * np.pi * search.tolerance
+    number, unit = dr.width(blocks.p), 2 * np.pi * search.tolerance
     curved = dr.gather(mi.Float, blocks.bend, pairs.block) > 0
-    radius = dr.gather(mi.Float, blocks.radius, pairs.block)
-    size = dr.full(mi.Float, dr.inf, len(wanted))
+    size = dr.full(mi.Float, dr.inf, len(wanted))  # of waves; infinite where they may change over a block
 
-    some = wanted & curved
-    pair = places(some)
-    block, piece = (dr.gather(mi.UInt32, of, pair) for of in pairs[:2])
-    there = sampled(some_of(frames, block), tab, k, rule, piece)
-    apart = there.ray2 > dr.square(OFF * dr.gather(mi.Float, radius, pair))
-    modulus = dr.sqrt(dr.square(there.real) + dr.square(there.imag))
-    dr.scatter(size, mi.Float(modulus), pair, apart & dr.gather(mi.Bool, some, pair))
+    pair = places(wanted & curved)
+    there = sampled(*_rays(search, frames, pairs, pair))
+    apart = there.ray2 > dr.square(OFF * _radius(blocks, pairs, pair))
+    apart &= dr.gather(mi.Bool, wanted & curved, pair)
+    dr.scatter(size, mi.Float(dr.sqrt(dr.square(there.real) + dr.square(there.imag))), pair, apart)
 
-    some = wanted & ~curved
-    pair = places(some)
-    n = len(pair)
-    block, piece = (dr.gather(mi.UInt32, of, pair) for of in pairs[:2])
-    index = dr.arange(mi.UInt32, PLACES * n)
-    of = index // PLACES
-    at = dr.gather(mi.UInt32, block, of) * (LATTICE * LATTICE) + lattice_place(index - PLACES * of)
-    samples = sampled(some_of(lattice, at), tab, k, rule, dr.gather(mi.UInt32, piece, of))
-    found = fit(samples, n, tab.types)
-    apart = dr.gather(mi.Bool, some, pair) & (found.ray2 > dr.square(AWAY * dr.gather(mi.Float, radius, pair)))
+    pair = places(wanted & ~curved)
+    samples = sampled(*_rays(search, lattice, pairs, pair, PLACES))
+    found = fit(samples, len(pair), search.tab.types)
+    apart = found.ray2 > dr.square(AWAY * _radius(blocks, pairs, pair))
+    apart &= dr.gather(mi.Bool, wanted & ~curved, pair)
     dr.scatter(size, mi.Float(dr.sqrt(found.size2)), pair, apart)
+
     chirp = dr.full(mi.UInt32, NONE, len(wanted))
     fits = apart & (found.off2 < (FITS * unit) ** 2) & (found.beats < BEATS)
-    dr.scatter(chirp, dr.arange(mi.UInt32, n), pair, fits)
+    dr.scatter(chirp, dr.arange(mi.UInt32, len(pair)), pair, fits)
     small, left = _small(size / (SMALL * unit), pairs.block, number)
-    near = _nearest(samples, block, number)
+    near = _nearest(samples, dr.gather(mi.UInt32, pairs.block, pair), number)
     return Waves(found.chirps, chirp, mi.Float(found.off2), small, SMALL * search.tolerance * left, *near)
+
+
+def _radius(blocks: Blocks, pairs: Pairs, pair: Any) -> Any:
+    """Of the blocks of some pairs."""
+    return dr.gather(mi.Float, blocks.radius, dr.gather(mi.UInt32, pairs.block, pair))
+
+
+def _rays(search: Search, frames: Frame, pairs: Pairs, pair: Any, each: int = 1) -> tuple[Frame, Table, Any, Rule, Any]:
+    """What `sampled` takes, of some pairs: along the ray to each block's middle, or to `each` of PLACES."""
+    index = dr.arange(mi.UInt32, each * len(pair))
+    of = index // each
+    own = dr.gather(mi.UInt32, pair, of)
+    at = dr.gather(mi.UInt32, pairs.block, own)
+    if each > 1:
+        at = at * (LATTICE * LATTICE) + lattice_place(index - each * of)
+    piece = dr.gather(mi.UInt32, pairs.piece, own)
+    return some_of(frames, at), search.tab, search.k, search.rule, piece
 
 
 def _small(size: Any, block: Any, number: int) -> tuple[Any, Any]:
