@@ -266,9 +266,9 @@ class _Bodies:
 
     def lists(self, blocks: Blocks) -> Lists | None:
         """What acts on each block; None where ends of runs, or what a few rays tell of a block, are not enough."""
-        options, corners = self.problem.options, self.rule.corners
-        if corners is None or options.rim == "smooth" or options.tolerance < LOOSE:
+        options = self.problem.options
+        if self.rule.corners is None or options.rim == "smooth" or options.tolerance < LOOSE:
             return None
         source, tolerance = self.problem.source, options.tolerance
-        search = Search(source, self.tab, self.k, self.rule, corners, tolerance, self.share, self.probe, self.grazing)
+        search = Search(source, self.tab, self.k, self.rule, tolerance, self.share, self.probe, self.grazing)
         return lists(search, blocks)

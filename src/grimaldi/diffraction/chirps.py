@@ -1,9 +1,9 @@
 """Waves over a flat block of receivers as chirps: what a piece sends there is e^{iψ}, ψ quadratic in the place, times
-an amplitude that is linear in it.
+an amplitude that is quadratic too.
 
 k(r + s - R) bends by little over the few pixels of a block, and what a short piece sends besides changes slowly. So a
-wave is asked for at nine places of a block, and told anywhere in it for a sine and a cosine; where its own nine values
-are not told closely enough it is no chirp.
+wave is asked for at nine places of a block, and told anywhere in it for a sine and a cosine; where these and four
+places between are not told closely enough it is no chirp (`waves`).
 """
 
 from __future__ import annotations
@@ -79,7 +79,7 @@ class Samples(NamedTuple):
 
 
 def sampled(fr: Frame, tab: Table, k: Any, rule: Rule, piece: Any) -> Samples:
-    """Evaluated."""
+    """What pieces send along the rays of frames, one each; evaluated."""
     first, end = tab.range(piece)
     chain = chain_wave(fr, tab, first, end, k, rule, None, False, dr.mask_t(k)(True))
     middle, _ = tab.sphere(piece)

@@ -30,6 +30,11 @@ class Frame(NamedTuple):
     lever: Any  # what its rounding is relative to
     plane: bool
 
+    def some(self, index: Any) -> Frame:
+        """Those at places of the arrays."""
+        a, foot, z1, z2, lever = (dr.gather(type(values), values, index) for values in self[:5])
+        return Frame(a, foot, z1, z2, lever, self.plane)
+
 
 def constant(Vector3: Any, v: Vector) -> Any:
     """A NumPy vector as a Dr.Jit one, no part of the kernel: another scene runs the same."""

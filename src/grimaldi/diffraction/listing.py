@@ -20,9 +20,9 @@ from grimaldi.diffraction.grazing import Near, near, other_than, worth
 from grimaldi.diffraction.hierarchy import NONE, least_detour
 from grimaldi.diffraction.lists import List, Lists, Parts, Runs, places
 from grimaldi.diffraction.model import ACROSS, LATTICE, Blocks, Receivers
-from grimaldi.diffraction.search import Pairs, Search, some_of
+from grimaldi.diffraction.search import Pairs, Search
 from grimaldi.diffraction.table import Piece, Table
-from grimaldi.diffraction.waves import Waves, waves
+from grimaldi.diffraction.waves import Waves, sums, waves
 
 mi: Any = mitsuba  # the stubs refuse numbers where arrays are asked for
 
@@ -98,8 +98,7 @@ def lists(search: Search, blocks: Blocks) -> Lists:
     kept &= ~found.small
     everywhere = kept & (found.index != NONE)
     left2 += dr.select(everywhere, dr.gather(mi.Float, found.off2, found.index, everywhere), 0)
-    left = dr.zeros(mi.UInt64, number)
-    dr.scatter_add(left, mi.UInt64(dr.ceil(left2 / unit)), pairs.block)
+    left = sums(dr.ceil(left2 / unit), pairs.block, number)
     dr.eval(begins, stops, first, end, everywhere)
     asked, asked_chirps, partly, chirped = _in_cells(pairs, number, verdicts, found, seen.passes)
     return Lists(
@@ -185,11 +184,11 @@ def _pairs(search: Search, blocks: Blocks, frames: Frame, n: int) -> Pairs:
     index = dr.arange(mi.UInt32, dr.width(blocks.p) * n)
     block = index // n
     middle, reach = tab.sphere(index - block * n)
-    detour = least_detour(some_of(frames, block), middle, reach + F(dr.gather(mi.Float, blocks.radius, block)))
+    detour = least_detour(frames.some(block), middle, reach + F(dr.gather(mi.Float, blocks.radius, block)))
     found = places(dr.gather(mi.Bool, blocks.active, block) & (detour <= tab.far))
 
     block = found // n
-    piece, fr = tab.piece(found - block * n), some_of(frames, block)
+    piece, fr = tab.piece(found - block * n), frames.some(block)
     radius, bend = (F(dr.gather(mi.Float, of, block)) for of in (blocks.radius, blocks.bend))
     normal = tab.types.Vector(dr.gather(type(blocks.n), blocks.n, block))
     d = fr.foot + fr.z2 * fr.a - piece.middle
@@ -246,7 +245,7 @@ def _look(search: Search, blocks: Blocks, frames: Frame, pairs: Pairs, beside: N
     by = None
     if beside is not None and search.grazing is not None:
         by = beside.of(pairs.block, mi.Bool(True), search.grazing)
-    found = _from_middle(search, some_of(frames, pairs.block), pairs.piece, x, V(normal), radius, by)
+    found = _from_middle(search, frames.some(pairs.block), pairs.piece, x, V(normal), radius, by)
     open_, idle, weak, far, inner2, start, stop, passes = found
     seen = _Seen(open_, idle, weak, far, mi.Float(inner2), mi.Float(start), mi.Float(stop), passes)
     dr.eval(*seen)
@@ -294,7 +293,8 @@ def _is_idle(inner2: Any, start: Any, stop: Any, tolerance: float) -> Any:
 @dr.syntax
 def _along(search: Search, fr: Frame, piece: Piece, radius: Any) -> tuple[Any, ...]:
     """What is in `_Seen` of a piece's segments: `far`, `inner2`, `start` and `stop`."""
-    tab, k, rule = search.tab, search.k, search.corners
+    tab, k, rule = search.tab, search.k, search.rule.corners
+    assert rule is not None
     F = tab.types.Float
     far = dr.mask_t(F)(True)
     inner2, start, stop = F(0), F(0), F(0)
@@ -365,7 +365,7 @@ def _faint(search: Search, frames: Frame, pairs: Pairs, pair: Any, some: Any) ->
     place, entry = index - of * corners, dr.gather(mi.UInt32, some, of)
     own = dr.gather(mi.UInt32, pair, entry)
     at = dr.gather(mi.UInt32, pairs.block, own) * corners + place
-    left = cut_off(some_of(frames, at), tab.piece(dr.gather(mi.UInt32, pairs.piece, own)), search.k)
+    left = cut_off(frames.some(at), tab.piece(dr.gather(mi.UInt32, pairs.piece, own)), search.k)
     dr.scatter_add(bits, dr.select(left < FAINT * search.tolerance, mi.UInt32(1) << place, 0), entry)
     dr.eval(bits)
     return bits
@@ -397,7 +397,7 @@ def _reached(search: Search, blocks: Blocks, frames: Frame, pairs: Pairs, pair: 
     p = dr.gather(type(blocks.lattice), blocks.lattice, at)
     n = dr.gather(type(blocks.normals), blocks.normals, at)
     piece = tab.piece(dr.gather(mi.UInt32, pairs.piece, own))
-    acts = sounds(some_of(frames, at), piece, tab.types.Vector(n))
+    acts = sounds(frames.some(at), piece, tab.types.Vector(n))
     x = mi.Point3f(piece.middle + constant(tab.types.Vector, tab.centre))
     q = mi.Point3f(p)
     acts &= probe.reaches(x, piece, q + probe.epsilon(q) * n, acts)

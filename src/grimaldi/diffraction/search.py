@@ -4,12 +4,9 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-import drjit as dr
-
-from grimaldi.diffraction.frame import Frame
 from grimaldi.diffraction.grazing import Chords
 from grimaldi.diffraction.occlusion import Rays
-from grimaldi.diffraction.segment import Corners, Rule
+from grimaldi.diffraction.segment import Rule
 from grimaldi.diffraction.table import Table
 from grimaldi.scene.model import Source
 
@@ -25,7 +22,6 @@ class Search(NamedTuple):
     tab: Table
     k: Any
     rule: Rule
-    corners: Corners
     tolerance: float
     share: float
     probe: Rays | None
@@ -38,9 +34,3 @@ class Pairs(NamedTuple):
     block: Any
     piece: Any
     index: Any  # of the pair among all
-
-
-def some_of(frames: Frame, index: Any) -> Frame:
-    """Some of the frames."""
-    a, foot, z1, z2, lever = (dr.gather(type(values), values, index) for values in frames[:5])
-    return Frame(a, foot, z1, z2, lever, frames.plane)

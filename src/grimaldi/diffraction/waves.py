@@ -13,15 +13,15 @@ from grimaldi.diffraction.frame import Frame
 from grimaldi.diffraction.hierarchy import NONE
 from grimaldi.diffraction.lists import List, places
 from grimaldi.diffraction.model import LATTICE, Blocks
-from grimaldi.diffraction.search import Pairs, Search, some_of
+from grimaldi.diffraction.search import Pairs, Search
 from grimaldi.diffraction.segment import Rule
 from grimaldi.diffraction.table import Table
 
 mi: Any = mitsuba  # the stubs refuse numbers where arrays are asked for
 
 FITS = 0.005  # of the tolerance: what chirps may leave of a piece's wave in the mean over a block
-BEATS = 3.0  # turns, by which a piece's ends may be further apart in one place of a block than in another: beats from
-# place to place would look like none,
+BEATS = 3.0  # turns, by which a piece's ends may be further apart in one place of a block than in another: beats
+# between those where waves are asked for would look like none
 AWAY = 0.7  # radii of a block, that rays to it pass by the piece at least: waves beside a ray change within pixels
 OFF = 2.0  # likewise, of a curved one, whose receivers may lie anywhere in a ball
 SMALL = 0.05  # of the tolerance: the sum of |M| of waves that are left out
@@ -82,7 +82,7 @@ def _rays(search: Search, frames: Frame, pairs: Pairs, pair: Any, each: int = 1)
     if each > 1:
         at = at * (LATTICE * LATTICE) + lattice_place(index - each * of)
     piece = dr.gather(mi.UInt32, pairs.piece, own)
-    return some_of(frames, at), search.tab, search.k, search.rule, piece
+    return frames.some(at), search.tab, search.k, search.rule, piece
 
 
 def _small(size: Any, block: Any, number: int) -> tuple[Any, Any]:
@@ -91,15 +91,15 @@ def _small(size: Any, block: Any, number: int) -> tuple[Any, Any]:
     limit = dr.zeros(mi.UInt32, number)
     for step in range(1, STEPS + 1):
         most = PARTS >> step
-        limit = dr.maximum(limit, dr.select(_sums(parts, block, number, parts <= most) <= PARTS, most, 0))
+        limit = dr.maximum(limit, dr.select(sums(parts, block, number, parts <= most) <= PARTS, most, 0))
     small = parts <= dr.gather(mi.UInt32, limit, block)
-    left = mi.Float(_sums(parts, block, number, small)) / PARTS
+    left = mi.Float(sums(parts, block, number, small)) / PARTS
     dr.eval(small, left)
     return small, left
 
 
-def _sums(parts: Any, block: Any, number: int, some: Any) -> Any:
-    """Of each block."""
+def sums(parts: Any, block: Any, number: int, some: Any = True) -> Any:
+    """Of some whole numbers in each block, the same in any order."""
     total = dr.zeros(mi.UInt64, number)
     dr.scatter_add(total, mi.UInt64(parts), block, some)
     return total
