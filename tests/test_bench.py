@@ -194,6 +194,7 @@ def test_the_tolerance_is_the_loosest_whose_error_is_allowed(share, monkeypatch)
 
     monkeypatch.setattr(error, "picture", picture)
     monkeypatch.setattr(error, "reference", exact)
+    monkeypatch.setattr(error, "anew", lambda scene: scene)
     found = error.loosest(None, 1.0, Film(4, 1, 0))  # type: ignore[arg-type]
     errors = [share * (tolerance - error.REFERENCE) for tolerance in TOLERANCES]
     allowed = [tolerance for tolerance, e in zip(TOLERANCES, errors, strict=True) if e <= error.ALLOWED]

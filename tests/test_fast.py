@@ -20,9 +20,10 @@ from grimaldi.diffraction.arrays import types
 from grimaldi.diffraction.boundary import boundary
 from grimaldi.diffraction.frame import Frame
 from grimaldi.diffraction.hierarchy import layout, least_detour
+from grimaldi.diffraction.lists import listed_sum
 from grimaldi.diffraction.model import OUTSIDE, Evaluate, Factor, Options, Receivers
 from grimaldi.diffraction.reach import reach
-from grimaldi.engine.asking import ask
+from grimaldi.engine.asking import Recordings, ask
 from grimaldi.engine.blocks import Sight, Squares, squares
 from grimaldi.engine.frozen import frozen
 from grimaldi.engine.tiles import Shot, sight
@@ -136,7 +137,8 @@ class Floor:
         factor = self.light.beams[0].factor
         assert receivers.active.numpy().all()
         return tuple(
-            m.real.numpy() + 1j * m.imag.numpy() for m in (ask(film, factor)(x, y, receivers), factor(receivers))
+            m.real.numpy() + 1j * m.imag.numpy()
+            for m in (ask(film, factor, Recordings())(x, y, receivers), factor(receivers))
         )
 
 
@@ -256,6 +258,22 @@ def test_a_recorded_model_tells_what_the_model_tells_wherever_it_is_asked():
             receivers = floor.sight(x, y).receivers
             for own, plain in zip(recorded(receivers), model(receivers), strict=True):
                 np.testing.assert_allclose(own.numpy(), mi.Float64(plain).numpy(), rtol=0, atol=1e-6)
+
+
+def test_another_picture_in_the_same_light_records_nothing_of_the_model(monkeypatch):
+    """And where the film has another size, lists have other arrays: what was recorded tells the same as anew."""
+    loaded = grimaldi.load(scenes.bodies(12, seed=2, size=64, spp=1))
+    settings: dict[str, Any] = {"wavelength": scenes.WAVELENGTH, "tolerance": 2e-2}
+    traced, seen = [], []
+    monkeypatch.setattr("grimaldi.diffraction.boundary.listed_sum", lambda *a: traced.append(0) or listed_sum(*a))
+    for size in ((64, 64), (64, 64), (80, 80), (96, 48)):
+        traced.clear()
+        again = grimaldi.render(loaded, size=size, **settings)
+        seen.append(len(traced))
+        anew = grimaldi.render(replace(loaded), size=size, **settings)
+        np.testing.assert_array_equal(again.U.values, anew.U.values)
+    assert seen[0] > 0
+    assert seen[1] == 0
 
 
 class Pair(NamedTuple):

@@ -21,10 +21,12 @@ from grimaldi.diffraction.boundary import boundary
 from grimaldi.diffraction.frame import toward
 from grimaldi.diffraction.model import Evaluate, Factor, Options, Receivers
 from grimaldi.diffraction.none import none
+from grimaldi.engine.asking import Recordings
 from grimaldi.engine.hits import Hits, hits
 from grimaldi.engine.judging import Shares
 from grimaldi.errors import InputError
 from grimaldi.options import checked_options
+from grimaldi.outlines.memory import once
 from grimaldi.propagate import Wave, carrier, factor
 from grimaldi.scene.bodies import indices, vertices
 from grimaldi.scene.model import Mesh, Scene, Source
@@ -65,12 +67,13 @@ class Settings:
 
 
 class Beam(NamedTuple):
-    """One source at one wavelength: its place in `Light.keys`, M at receivers, and U from M there."""
+    """One source at one wavelength: its place in `Light.keys`, M at receivers, U from M there, and M as recorded."""
 
     source: Source
     key: int
     factor: Evaluate
     times: Callable[[Receivers, Factor], Wave]
+    recordings: Recordings
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,16 +167,19 @@ def prepare(scene: Scene, settings: Settings) -> Light:
     where = np.concatenate([seen(scene, sensor).points for sensor in scene.mitsuba.sensors()])
     sources = scene.sources if settings.interference else separated(scene.sources)
     keys = tuple((wavelength, group) for wavelength in wavelengths for group in groups(sources))
-    beams = tuple(
-        Beam(
+    of = settings.diffraction, options, blake2b(where.tobytes(), digest_size=16).digest()
+
+    def beam(wavelength: float, source: Source) -> Beam:
+        k = 2 * np.pi / wavelength
+        return Beam(
             source,
             keys.index((wavelength, source.group)),
-            factor(scene, source, chosen, 2 * np.pi / wavelength, options, where),
-            carrier(source, 2 * np.pi / wavelength, types(double=False)),
+            factor(scene, source, chosen, k, options, where),
+            carrier(source, k, types(double=False)),
+            once(scene, ("recordings", source, k, *of), Recordings),
         )
-        for wavelength in wavelengths
-        for source in sources
-    )
+
+    beams = tuple(beam(wavelength, source) for wavelength in wavelengths for source in sources)
     interpolates = options.fast and chosen is boundary
     shares = tuple(_shares(beams, beam, options.tolerance) for beam in beams) if interpolates else ()
     return Light(scene, hits(scene), beams, keys, shares, chosen is not none)

@@ -9,7 +9,7 @@ import grimaldi
 from grimaldi.bench.error import HOW, PATIENCE, Film, loosest, picture
 from grimaldi.bench.model import Result, Settings, Target
 from grimaldi.bench.scenes import WAVELENGTH, bodies
-from grimaldi.bench.timing import LONG, beside, timed, written
+from grimaldi.bench.timing import LONG, anew, beside, timed, written
 
 NUMBERS = (10, 100, 1_000, 10_000)
 MOST = 0.5  # the exponent over the last two decades
@@ -56,7 +56,7 @@ def _one(n: int, film: Film, runs: int, patience: float) -> tuple[dict[str, str]
     wave, rays, done = beside(
         runs,
         found.time,
-        lambda: picture(scene, WAVELENGTH, film, tolerance=found.tolerance),
+        lambda: picture(anew(scene), WAVELENGTH, film, tolerance=found.tolerance),
         lambda: picture(scene, WAVELENGTH, film, diffraction="none"),
     )
     line = {

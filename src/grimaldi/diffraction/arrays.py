@@ -14,6 +14,13 @@ from grimaldi.variants import check_variant, on_cuda
 
 ALIGNED = 128  # bytes
 
+_DTYPES = {
+    dr.VarType.Float64: np.float64,
+    dr.VarType.Float32: np.float32,
+    dr.VarType.UInt32: np.uint32,
+    dr.VarType.Bool: np.bool_,
+}
+
 
 class Types(NamedTuple):
     """Array types of one precision."""
@@ -24,16 +31,20 @@ class Types(NamedTuple):
 
     def buffer(self, values: NDArray[Any]) -> Any:
         """Numbers as one flat device buffer."""
-        dtype = np.float64 if dr.itemsize_v(self.Float) == 8 else np.float32
-        copy = aligned_empty(values.size, dtype)
-        copy.reshape(values.shape)[...] = values
-        return self.Float(copy)
+        return buffer(self.Float, values)
 
     def taken(self, values: NDArray[Any]) -> Any:
         """The same of an array that nobody writes to any more: where it may be read in place, no copy."""
         flat = values.ravel()
         in_place = dr.itemsize_v(self.Float) == values.itemsize and flat.ctypes.data % ALIGNED == 0
         return self.Float(flat) if in_place else self.buffer(flat)
+
+
+def buffer(kind: Any, values: NDArray[Any]) -> Any:
+    """Numbers or flags as one flat device array of a kind."""
+    copy = aligned_empty(values.size, _DTYPES[dr.type_v(kind)])
+    copy.reshape(values.shape)[...] = values
+    return kind(copy)
 
 
 def aligned_empty(count: int, dtype: Any) -> NDArray[Any]:

@@ -12,7 +12,7 @@ import drjit as dr
 import numpy as np
 from numpy.typing import NDArray
 
-from grimaldi.diffraction.arrays import Types, on_device
+from grimaldi.diffraction.arrays import Types, buffer, on_device
 from grimaldi.diffraction.frame import Frame, way
 
 CHILDREN = 2
@@ -58,9 +58,7 @@ class Layout(NamedTuple):
         """On the device; item (m,): what each node stands for, `NONE` if only for what is inside."""
         index = dr.uint32_array_t(types.Float)
         size = on_device(index, len(self.skip))
-        return Tree(
-            types.buffer(self.spheres), index(self.skip.astype(np.uint32)), index(item.astype(np.uint32)), size, types
-        )
+        return Tree(types.buffer(self.spheres), buffer(index, self.skip), buffer(index, item), size, types)
 
 
 def flat(centre: NDArray[np.float64], radius: NDArray[np.float64]) -> Layout:

@@ -8,7 +8,7 @@ import drjit as dr
 import numpy as np
 from numpy.typing import NDArray
 
-from grimaldi.diffraction.arrays import Types, on_device
+from grimaldi.diffraction.arrays import Types, buffer, on_device
 from grimaldi.diffraction.hierarchy import NONE, Layout, Tree, flat, layout
 from grimaldi.diffraction.model import Options
 from grimaldi.outlines.model import Outline, Reals
@@ -166,10 +166,10 @@ class Packed(NamedTuple):
             on_device(index, len(self.segments)),
             on_device(index, len(self.plan.order)),
             types.buffer(self.segments),
-            index(self.runs.ravel().astype(np.uint32)),
+            buffer(index, self.runs),
             types.buffer(self.pieces),
-            index(np.repeat(np.arange(len(self.ranges) - 1), np.diff(self.ranges)).astype(np.uint32)),
-            dr.mask_t(types.Float)(self.follows),
+            buffer(index, np.repeat(np.arange(len(self.ranges) - 1), np.diff(self.ranges))),
+            buffer(dr.mask_t(types.Float), self.follows),
             self.plan.tree(self.item, types),
             on_device(types.Float, min(self.far, 1e30)),
             on_device(types.Float, angle),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
@@ -10,7 +11,7 @@ import drjit as dr
 
 from grimaldi.diffraction.model import OUTSIDE, Evaluate, Factor, Grouped, Receivers, Twofold
 from grimaldi.engine.blocks import Squares
-from grimaldi.engine.frozen import frozen
+from grimaldi.engine.frozen import Recording, frozen
 
 FEWEST = 127  # receivers: of as many as there are of something else, or one, each would be recorded anew
 
@@ -18,20 +19,31 @@ Ask = Callable[[Any, Any, Receivers], Factor]
 """ask(x, y, receivers): M at receivers that are seen at places of the film [pixels], Float64, evaluated."""
 
 
-def ask(film: Squares, factor: Evaluate) -> Ask:
+@dataclass(frozen=True)
+class Recordings:
+    """Of a model, for all pictures in its light: at receivers anywhere and in blocks, each in both precisions."""
+
+    whole: tuple[Recording, Recording] = field(default_factory=lambda: (Recording(), Recording()))
+    listed: tuple[Recording, Recording] = field(default_factory=lambda: (Recording(), Recording()))
+
+
+def ask(film: Squares, factor: Evaluate, recordings: Recordings) -> Ask:
     """How to ask a model for M at what a camera sees."""
-    whole = _replayed(factor)
+    whole = _replayed(factor, recordings.whole)
     listed = factor.among(film.blocks) if isinstance(factor, Grouped) else factor
     if listed is factor:
         return lambda x, y, receivers: whole(receivers)
-    return partial(_by_blocks, film, _replayed(listed), whole)
+    return partial(_by_blocks, film, _replayed(listed, recordings.listed), whole)
 
 
-def _replayed(evaluate: Evaluate) -> Evaluate:
+def _replayed(evaluate: Evaluate, recordings: tuple[Recording, Recording]) -> Evaluate:
     """A model recorded once; what it seldom does by itself, since recordings take as long as there is in them."""
     if not isinstance(evaluate, Twofold):
-        return frozen(evaluate)
-    return partial(_twofold, frozen(evaluate.single), frozen(evaluate.double), evaluate.tolerance)
+        return frozen(evaluate, recordings[0])
+    single, double = (
+        frozen(part, own) for part, own in zip((evaluate.single, evaluate.double), recordings, strict=True)
+    )
+    return partial(_twofold, single, double, evaluate.tolerance)
 
 
 def _twofold(single: Evaluate, double: Evaluate, tolerance: float, receivers: Receivers) -> Factor:

@@ -11,6 +11,7 @@ import mitsuba
 import numpy as np
 from numpy.typing import NDArray
 
+from grimaldi.diffraction.arrays import buffer
 from grimaldi.diffraction.model import ACROSS, LATTICE, OUTSIDE, Blocks, Receivers
 
 mi: Any = mitsuba  # the stubs refuse numbers where arrays are asked for
@@ -114,7 +115,7 @@ def squares(see: Callable[[Any, Any], Sight], width: int, top: int, rows: int) -
         further.append(index)
     return Squares(
         _blocks(groups, _beside(groups, square, further, across, down)),
-        tuple(mi.UInt32(index.astype(np.uint32)) for index in further),
+        tuple(buffer(mi.UInt32, index) for index in further),
         dr.opaque(mi.UInt32, across),
         dr.opaque(mi.UInt32, down),
         dr.opaque(mi.Float, top),
@@ -196,15 +197,15 @@ def _blocks(group: _Group, beside: list[Integers]) -> Blocks:
     return Blocks(
         mi.Point3d(group.p.T),
         mi.Vector3f(group.n.T.astype(single)),
-        mi.Float(group.radius.astype(single)),
-        mi.Float(group.bend.astype(single)),
-        mi.Bool(group.there),
+        buffer(mi.Float, group.radius),
+        buffer(mi.Float, group.bend),
+        buffer(mi.Bool, group.there),
         mi.Point3d(group.lattice.reshape(-1, 3).T),
         mi.Vector3f(group.normals.reshape(-1, 3).T.astype(single)),
         mi.Vector3f(right.T.astype(single)),
         mi.Vector3f(down.T.astype(single)),
         _bits(group.member | (group.bend == 0)[:, None]),
-        tuple(mi.UInt32(b.astype(np.uint32)) for b in beside),
+        tuple(buffer(mi.UInt32, b) for b in beside),
     )
 
 
@@ -217,4 +218,4 @@ def _pixel(group: _Group) -> tuple[Reals, Reals]:
 
 def _bits(flags: NDArray[np.bool_]) -> Any:
     """Rows of flags (n, m) as numbers (n,)."""
-    return mi.UInt32((flags << np.arange(flags.shape[1])).sum(1).astype(np.uint32))
+    return buffer(mi.UInt32, (flags << np.arange(flags.shape[1])).sum(1))

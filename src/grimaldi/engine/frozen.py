@@ -17,23 +17,40 @@ from grimaldi.variants import on_cuda
 
 mi: Any = mitsuba  # the stubs refuse numbers where arrays are asked for
 
+KEPT = 8  # recordings of a model: one for each way in which its arrays have equal sizes
 SHAPES = 2000  # in all scenes that a model holds: Dr.Jit looks at each of more for longer than Python takes to trace
 
 
-def frozen(evaluate: Evaluate) -> Evaluate:
+class Recording:
+    """What Dr.Jit recorded of a model, and of those that differ from it in nothing but their arrays."""
+
+    def __init__(self) -> None:
+        self._model: Evaluate | None = None  # while it is asked
+        self._replayed = dr.freeze(self._asked, state_fn=lambda *_: held(self._model), limit=KEPT, warn_after=1 << 31)
+
+    def _asked(self, *receivers: Any) -> tuple[Any, ...]:
+        assert self._model is not None
+        return tuple(mi.Float64(v) for v in self._model(Receivers(*receivers)))
+
+    def ask(self, model: Evaluate, receivers: Receivers, again: bool) -> tuple[Any, ...]:
+        """M by the model; `again`: whether it may be replayed."""
+        self._model = model
+        try:
+            return (self._replayed if again else self._asked)(*receivers)
+        finally:
+            self._model = None
+
+
+def frozen(model: Evaluate, recording: Recording | None = None) -> Evaluate:
     """The same model, evaluated at receivers: Float64 arrays."""
-
-    def asked(*receivers: Any) -> tuple[Any, ...]:
-        return tuple(mi.Float64(v) for v in evaluate(Receivers(*receivers)))
-
-    state = held(evaluate)
-    shapes = sum(len(part.shapes()) for part in state if isinstance(part, mi.Scene))
-    replayed = asked if on_cuda() or shapes > SHAPES else dr.freeze(asked, state_fn=lambda *_: state)
+    recording = recording or Recording()
+    shapes = sum(len(part.shapes()) for part in held(model) if isinstance(part, mi.Scene))
+    again = not on_cuda() and shapes <= SHAPES
 
     def evaluated(receivers: Receivers) -> Factor:
         dr.make_opaque(*receivers)  # a literal would need a recording of its own
         with _no_garbage_collected():
-            m = Factor(*replayed(*receivers))
+            m = Factor(*recording.ask(model, receivers, again))
         dr.eval(*m)
         return m
 
@@ -52,7 +69,7 @@ def _no_garbage_collected() -> Iterator[None]:
             gc.enable()
 
 
-def held(evaluate: Evaluate) -> tuple[Any, ...]:
+def held(evaluate: Any) -> tuple[Any, ...]:
     """The arrays and scenes that a model's data and functions hold, however deep."""
     found: list[Any] = []
     seen: set[int] = set()

@@ -96,7 +96,7 @@ def bands(light: Light, sensor: Any, shot: Shot) -> Iterator[Band]:
     for top in range(0, shot.height, step):
         rows = min(step, shot.height - top)
         film = squares(lambda x, y: sight(light, sensor, shot, x, y)[0], shot.width, top, rows)
-        asks = tuple(ask(film, beam.factor) for beam in light.beams)
+        asks = tuple(ask(film, beam.factor, beam.recordings) for beam in light.beams)
         found = tuple(
             cells(partial(_nodes, light, a, sensor, shot), shot.width, top, rows, finest, shares)
             for a, shares in zip(asks, light.shares, strict=True)
