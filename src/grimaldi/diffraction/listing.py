@@ -320,8 +320,8 @@ def _along(search: Search, fr: Frame, piece: Piece, radius: Any) -> tuple[Any, .
 def _verdicts(search: Search, blocks: Blocks, frames: Frame, pairs: Pairs, tested: Any, seen: _Seen) -> tuple[Any, Any]:
     """Of pieces that are `tested`, the cells of blocks where to ask for them, and the corners of cells they reach.
 
-    By a ray to each corner. A cell is to be asked where its corners differ, if the piece is not too weak for that, or
-    where they lie on another surface; and all of them for what passes other silhouettes.
+    By a ray to each corner on the block's own surface. If they differ, and the piece is not too weak for that, a cell
+    is to be asked where its own do, or lie on another surface; and all of them for what passes other silhouettes.
     """
     asked, reached = dr.zeros(mi.UInt32, len(tested)), dr.zeros(mi.UInt32, len(tested))
     pair: Any = dr.compress(tested)
@@ -332,23 +332,23 @@ def _verdicts(search: Search, blocks: Blocks, frames: Frame, pairs: Pairs, teste
         return asked, reached
     members = dr.gather(mi.UInt32, blocks.members, dr.gather(mi.UInt32, pairs.block, pair))
     weak = dr.gather(mi.Bool, seen.weak, pair)
-    first = members & dr.select(weak, mi.UInt32(COARSE), EVERY)
+    first = members & dr.select(weak & ((members & COARSE) != 0), mi.UInt32(COARSE), EVERY)
     bits = _reached(search, blocks, frames, pairs, pair, first)
     differ = (bits != 0) & (bits != first)
     bits = dr.select(bits == first, members, bits)
     bits |= _reached(search, blocks, frames, pairs, pair, dr.select(differ, members & ~first, 0))
-    filled, known = _filled(bits, members)
+    filled = _filled(bits, members)
     passes = dr.gather(mi.Bool, seen.passes, pair)
-    strong = ~weak & (((bits != 0) & (bits != members)) | (members != EVERY) | passes)
+    uniform = (bits == 0) | (bits == members)
+    strong = ~weak & (~uniform | passes)
     faint = dr.select(weak, EVERY, _faint(search, frames, pairs, pair, strong))
     ask = mi.UInt32(0)
     for y in range(ACROSS):
         for x in range(ACROSS):
             own = sum(1 << ((y + dy) * LATTICE + x + dx) for dy in (0, 1) for dx in (0, 1))
             same = ((bits & own) == own) | ((bits & own) == 0)
-            clear = ~passes & same & ((members & own) == own)
-            tells = dr.select((faint & own) == own, (known & own) == own, clear)
-            ask |= dr.select(tells, 0, 1 << (y * ACROSS + x))
+            clear = ~passes & same & (((members & own) == own) | uniform)
+            ask |= dr.select(((faint & own) == own) | clear, 0, 1 << (y * ACROSS + x))
     dr.scatter(asked, ask, pair)
     dr.scatter(reached, filled, pair)
     dr.eval(asked, reached)
@@ -371,17 +371,20 @@ def _faint(search: Search, frames: Frame, pairs: Pairs, pair: Any, some: Any) ->
     return bits
 
 
-def _filled(bits: Any, members: Any) -> tuple[Any, Any]:
-    """Bits of a lattice's corners that are no members as those of members beside them, and which have any beside."""
+def _filled(bits: Any, members: Any) -> Any:
+    """Bits of a lattice's corners that are no members as those of the members nearest to them."""
     column = [sum(1 << (row * LATTICE + x) for row in range(LATTICE)) for x in range(LATTICE)]
     inner = ((1 << LATTICE * LATTICE) - 1) ^ column[0]
 
     def beside(flags: Any) -> Any:
         flags = flags | ((flags << 1) & inner) | ((flags >> 1) & (inner >> 1))
-        return flags | (flags << LATTICE) | (flags >> LATTICE)
+        return (flags | (flags << LATTICE) | (flags >> LATTICE)) & EVERY
 
-    known = members | beside(members)
-    return (bits & members) | (beside(bits & members) & ~members), known
+    bits, known = bits & members, members
+    for _ in range(ACROSS):
+        bits |= beside(bits) & ~known
+        known = beside(known)
+    return bits
 
 
 def _reached(search: Search, blocks: Blocks, frames: Frame, pairs: Pairs, pair: Any, asked: Any) -> Any:
