@@ -297,7 +297,7 @@ def test_the_finer_part_of_a_model_is_asked_where_the_other_errs(above):
     x = dr.arange(mi.Float64, 1000)
     tolerance = 999.5 - above
     point = Receivers(mi.Point3d(x, 2 * x, 0), mi.Vector3f(0, 0, 1), x >= 0)
-    told = ask(None, Pair(tells(1, 1), tells(2, 0.5), tolerance))(None, None, point)  # pyright: ignore
+    told = ask(None, Pair(tells(1, 1), tells(2, 0.5), tolerance), Recordings())(None, None, point)  # pyright: ignore
     errs = x.numpy() > tolerance
     assert errs.sum() == above
     np.testing.assert_array_equal(told.real.numpy(), np.where(errs, 2, 1))

@@ -346,8 +346,8 @@ def _verdicts(search: Search, blocks: Blocks, frames: Frame, pairs: Pairs, teste
     for y in range(ACROSS):
         for x in range(ACROSS):
             own = sum(1 << ((y + dy) * LATTICE + x + dx) for dy in (0, 1) for dx in (0, 1))
-            same = ((bits & own) == own) | ((bits & own) == 0)
-            clear = ~passes & same & (((members & own) == own) | uniform)
+            same = ((filled & own) == own) | ((filled & own) == 0)
+            clear = ~passes & same
             ask |= dr.select(((faint & own) == own) | clear, 0, 1 << (y * ACROSS + x))
     dr.scatter(asked, ask, pair)
     dr.scatter(reached, filled, pair)
