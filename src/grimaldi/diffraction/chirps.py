@@ -3,7 +3,7 @@ an amplitude that is quadratic too.
 
 k(r + s - R) bends by little over the few pixels of a block, and what a short piece sends besides changes slowly. So a
 wave is asked for at nine places of a block, and told anywhere in it for a sine and a cosine; where these and four
-places between are not told closely enough it is no chirp (`waves`).
+places between are not told closely enough it is no chirp there, but may be in a quadrant of the block (`waves`).
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from grimaldi.diffraction.arrays import Types
 from grimaldi.diffraction.edges import chain_wave
 from grimaldi.diffraction.frame import Frame
 from grimaldi.diffraction.hierarchy import least_detour
-from grimaldi.diffraction.model import ACROSS, LATTICE, Receivers
+from grimaldi.diffraction.model import ACROSS, LATTICE, Blocks, Receivers
 from grimaldi.diffraction.segment import Rule
 from grimaldi.diffraction.sines import of_turns
 from grimaldi.diffraction.table import Table
@@ -30,7 +30,9 @@ SIDE = 3  # places across a block, by which waves are told
 GRID = [(u, v) for v in (-1.0, 0.0, 1.0) for u in (-1.0, 0.0, 1.0)]
 BETWEEN = [(u, v) for v in (-0.5, 0.5) for u in (-0.5, 0.5)]  # and by which that is tried
 PLACES = len(GRID) + len(BETWEEN)
+QUADRANTS = 4
 PACKETS = 5
+CELLS, CORNERS = ACROSS * ACROSS, LATTICE * LATTICE  # of a block
 FARTHEST = 1e30  # square of distances, for no distance
 
 
@@ -43,6 +45,10 @@ class Chirps(NamedTuple):
 
     packets: Any
     types: Types
+
+    def and_those_of(self, other: Chirps) -> Chirps:
+        """Both, one after the other."""
+        return Chirps(dr.concat((self.packets, other.packets)), self.types)
 
     def at(self, i: Any, u: Any, v: Any) -> tuple[Any, Any]:
         """The wave i."""
@@ -57,6 +63,12 @@ def _quadratic(terms: tuple[Any, ...], u: Any, v: Any) -> Any:
     """The value of one, by its terms in 1, u, v, u², uv, v²."""
     one, of_u, of_v, of_uu, of_uv, of_vv = terms
     return dr.fma(u, dr.fma(u, of_uu, dr.fma(v, of_uv, of_u)), dr.fma(v, dr.fma(v, of_vv, of_v), one))
+
+
+def quadrant(cell: Any) -> Any:
+    """Which quadrant of its block a cell lies in."""
+    half = ACROSS // 2
+    return cell // (half * ACROSS) * 2 + cell % ACROSS // half
 
 
 def place(receivers: Receivers) -> tuple[Any, Any]:
@@ -91,11 +103,40 @@ def sampled(fr: Frame, tab: Table, k: Any, rule: Rule, piece: Any) -> Samples:
     return Samples(*found)
 
 
-def lattice_place(i: Any) -> Any:
-    """Where the i-th of PLACES stands in the lattice of a block."""
+def lattice_and_middles(blocks: Blocks) -> Any:
+    """Receivers at places of blocks (Float64): the lattice of each, then the middles of each one's cells.
+
+    The film sees planes at a slant: middles are told by quadratics through the corners about them.
+    """
+    weights = {0: (0.375, 0.75, -0.125), 1: (-0.125, 0.75, 0.375)}
+    middles = dr.arange(mi.UInt32, CELLS * dr.width(blocks.p))
+    block = middles // CELLS
+    cell = middles - block * CELLS
+    x, y = cell % ACROSS, cell // ACROSS
+    first = block * CORNERS + (y // 2 * LATTICE + x // 2) * 2
+    middle = dr.zeros(type(blocks.lattice), len(middles))
+    for n in range(3):
+        for m in range(3):
+            of_row, of_column = (dr.select((i & 1) == 0, weights[0][j], weights[1][j]) for i, j in ((y, n), (x, m)))
+            corner = dr.gather(type(blocks.lattice), blocks.lattice, first + n * LATTICE + m)
+            middle += of_row * of_column * corner
+    return type(middle)(*(dr.concat((a, b)) for a, b in zip(blocks.lattice, middle, strict=True)))
+
+
+def place_of(block: Any, i: Any, number: int, of: Any | None = None) -> Any:
+    """Where in `lattice_and_middles` the i-th of PLACES of one of `number` blocks is, or of one of its quadrants."""
     half = ACROSS // 2
-    places = [int(half * (v + 1)) * LATTICE + int(half * (u + 1)) for u, v in (*GRID, *BETWEEN)]
-    return dr.gather(type(i), type(i)(places), i)
+    column, row = (
+        dr.gather(type(i), type(i)([int(half * (place[axis] + 1)) for place in (*GRID, *BETWEEN)]), i)
+        for axis in (0, 1)
+    )
+    if of is None:
+        return block * CORNERS + row * LATTICE + column
+    # halved, places on the lattice stay on it, those between are the middles of cells
+    column, row = column + (of & 1) * ACROSS, row + (of >> 1) * ACROSS
+    corner = block * CORNERS + (row >> 1) * LATTICE + (column >> 1)
+    middle = number * CORNERS + block * CELLS + (row >> 1) * ACROSS + (column >> 1)
+    return dr.select(i < len(GRID), corner, middle)
 
 
 class Fit(NamedTuple):
@@ -109,17 +150,17 @@ class Fit(NamedTuple):
     ray2: Any
 
 
-def fit(samples: Samples, n: int, types: Types) -> Fit:
-    """n waves, each by PLACES samples; evaluated."""
+def fit(samples: Samples, n: int, types: Types, of: Any | None = None) -> Fit:
+    """n waves, each by PLACES samples, of blocks or `of` some quadrants of theirs (n,); evaluated."""
     F, index = types.Float, dr.arange(dr.uint32_array_t(types.Float), n)
 
     def at_places(values: Any) -> list[Any]:
         return [dr.gather(F, values, PLACES * index + t) for t in range(PLACES)]
 
-    turns = _terms(at_places(samples.turns))
+    turns = (F(0), *_terms(at_places(samples.turns))[1:])
     left, right = [], []
     for (u, v), re, im in zip((*GRID, *BETWEEN), at_places(samples.real), at_places(samples.imag), strict=True):
-        sin, cos = of_turns(_quadratic((0, *turns[1:]), u, v))
+        sin, cos = of_turns(_quadratic(turns, u, v))
         left.append(re * cos + im * sin)
         right.append(im * cos - re * sin)
     real, imag = _terms(left), _terms(right)
@@ -130,6 +171,13 @@ def fit(samples: Samples, n: int, types: Types) -> Fit:
     low, high, ray2 = F(dr.inf), F(-dr.inf), F(FARTHEST)
     for spread, distance2 in zip(at_places(samples.spread), at_places(samples.ray2), strict=True):
         low, high, ray2 = dr.minimum(low, spread), dr.maximum(high, spread), dr.minimum(ray2, distance2)
+    if of is not None:
+        turns, real, imag = (_widened(terms, of) for terms in (turns, real, imag))
+        sin, cos = of_turns(turns[0] - dr.round(turns[0]))
+        real, imag = (
+            [re * cos - im * sin for re, im in zip(real, imag, strict=True)],
+            [re * sin + im * cos for re, im in zip(real, imag, strict=True)],
+        )
     amplitude = [part for pair in zip(real, imag, strict=True) for part in pair]
     numbers = [*turns[1:], *amplitude, F(0), F(0), F(0)]
     packets = dr.zeros(F, 4 * PACKETS * n)
@@ -138,6 +186,20 @@ def fit(samples: Samples, n: int, types: Types) -> Fit:
     found = size2 / PLACES, off2 / PLACES, high - low, ray2
     dr.eval(packets, *found)
     return Fit(Chirps(packets, types), *found)
+
+
+def _widened(terms: tuple[Any, ...], of: Any) -> tuple[Any, ...]:
+    """The same quadratic at places of blocks, by its terms at places of some quadrants: u of these is 2u ± 1."""
+    one, of_u, of_v, of_uu, of_uv, of_vv = terms
+    s, t = (dr.select(side > 0, type(one)(1), -1) for side in (of & 1, of >> 1))
+    return (
+        one - s * of_u - t * of_v + of_uu + s * t * of_uv + of_vv,
+        2 * of_u - 4 * s * of_uu - 2 * t * of_uv,
+        2 * of_v - 4 * t * of_vv - 2 * s * of_uv,
+        4 * of_uu,
+        4 * of_uv,
+        4 * of_vv,
+    )
 
 
 def _terms(values: list[Any]) -> tuple[Any, ...]:

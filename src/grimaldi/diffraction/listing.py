@@ -13,6 +13,7 @@ import drjit as dr
 import mitsuba
 import numpy as np
 
+from grimaldi.diffraction.chirps import QUADRANTS, lattice_and_middles, quadrant
 from grimaldi.diffraction.corners import Corner, corner, slopes
 from grimaldi.diffraction.edges import cut_off, sounds
 from grimaldi.diffraction.frame import Frame, constant, frame
@@ -92,24 +93,27 @@ def lists(search: Search, blocks: Blocks) -> Lists:
     left2 += dr.select(stops & ~strong[1], dr.square(seen.stop), 0)
     unit = (CORNER * limit) ** 2 / FINE
     first, end = tab.range(pairs.piece)
-    lattice = _frames(search, blocks.lattice)
-    verdicts = _verdicts(search, blocks, lattice, pairs, tested, seen)
-    found = waves(search, blocks, frames, lattice, pairs, kept | ((verdicts[0] | verdicts[1]) != 0))
+    at_places = _frames(search, lattice_and_middles(blocks))
+    verdicts = _verdicts(search, blocks, at_places, pairs, tested, seen)
+    found = waves(search, blocks, frames, at_places, pairs, kept | ((verdicts[0] | verdicts[1]) != 0))
     kept &= ~found.small
-    everywhere = kept & (found.index != NONE)
-    left2 += dr.select(everywhere, dr.gather(mi.Float, found.off2, found.index, everywhere), 0)
+    for i in range(QUADRANTS):
+        chirp = dr.gather(mi.UInt32, found.index, QUADRANTS * dr.arange(mi.UInt32, len(kept)) + i, kept)
+        told = kept & (chirp != NONE)
+        left2 += dr.select(told, dr.gather(mi.Float, found.off2, chirp, told) / QUADRANTS, 0)
     left = sums(dr.ceil(left2 / unit), pairs.block, number)
-    dr.eval(begins, stops, first, end, everywhere)
+    dr.eval(begins, stops, first, end, kept)
+    runs, everywhere = _in_quadrants(tab, pairs, number, kept, follows, found)
     asked, asked_chirps, partly, chirped = _in_cells(pairs, number, verdicts, found, seen.passes)
     return Lists(
         dr.opaque(mi.UInt32, number),
         asked,
         asked_chirps,
         partly,
-        _runs(tab, pairs.piece, kept & ~everywhere, follows, pairs.block, number),
+        runs,
         found.chirps,
         chirped,
-        List.of(everywhere, pairs.block, number, found.index),
+        everywhere,
         found.clear,
         found.receiver2,
         List.of(begins & strong[0], pairs.block, number, first),
@@ -137,6 +141,26 @@ def _runs(tab: Table, piece: Any, taken: Any, follows: Any, place: Any, number: 
     return Runs(of(taken & ~along, items=first), of(taken & ~_of_next(along), items=end - 1))
 
 
+def _in_quadrants(tab: Table, pairs: Pairs, number: int, kept: Any, follows: Any, found: Waves) -> tuple[Runs, List]:
+    """Those lists of quadrants of `number` blocks that `Lists` has, of the pairs that are kept."""
+    own = places(kept)
+    count = dr.opaque(mi.UInt32, len(own))
+    index = dr.arange(mi.UInt32, QUADRANTS * len(own))
+    of = index // count
+    entry = index - of * count
+    pair = dr.gather(mi.UInt32, own, entry)
+    before = dr.gather(mi.UInt32, own, dr.maximum(entry, 1) - 1)
+    follows = dr.gather(mi.Bool, follows, pair) & (before + 1 == pair)
+    chirp = dr.gather(mi.UInt32, found.index, QUADRANTS * pair + of)
+    there = dr.gather(mi.Bool, kept, pair)
+    place = of * number + dr.gather(mi.UInt32, pairs.block, pair)
+    told = there & (chirp != NONE)
+    piece = dr.gather(mi.UInt32, pairs.piece, pair)
+    dr.eval(told, chirp, place, follows, piece)
+    runs = _runs(tab, piece, there & ~told, follows, place, QUADRANTS * number)
+    return runs, List.of(told, place, QUADRANTS * number, chirp)
+
+
 def _in_cells(
     pairs: Pairs, number: int, verdicts: tuple[Any, Any], found: Waves, passes: Any
 ) -> tuple[List, Any, Parts, Parts]:
@@ -155,7 +179,7 @@ def _in_cells(
     own = dr.gather(mi.UInt32, piece, entry)
     place = cell * dr.opaque(mi.UInt32, number) + dr.gather(mi.UInt32, block, entry)
     of = dr.gather(mi.UInt32, pair, entry)
-    chirp = dr.gather(mi.UInt32, found.index, of)
+    chirp = dr.gather(mi.UInt32, found.index, QUADRANTS * of + quadrant(cell))
     by_chirp = dr.select(dr.gather(mi.Bool, passes, of), NONE, chirp)  # what passes silhouettes is told apart by sides
     reaches, told = ~asks & (corners > 0), chirp != NONE
     dr.eval(corners, asks, chirp, by_chirp, reaches, told, place, own)

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import drjit as dr
 import mitsuba
 
-from grimaldi.diffraction.chirps import PLACES, SIDE, Chirps, place
+from grimaldi.diffraction.chirps import PLACES, SIDE, Chirps, place, quadrant
 from grimaldi.diffraction.corners import corner, leading
 from grimaldi.diffraction.edges import Chain, Margins, Nearest, Passed, Sum, chain_wave
 from grimaldi.diffraction.frame import Frame
@@ -81,18 +81,18 @@ class Parts(NamedTuple):
 class Lists(NamedTuple):
     """What acts on each block, or on each cell: pieces, runs that reach it, ends of runs, |M| left out.
 
-    Pieces whose waves are chirps over a block are on no other list of what reaches it than those of chirps.
-    Cell c of block b has the place c · blocks + b in lists of cells.
+    Pieces whose waves are chirps over a quadrant of a block are on no other list of what reaches it than those of
+    chirps. Cell c of block b has the place c · blocks + b in lists of cells, and so have quadrants.
     """
 
     blocks: Any  # how many
     asked: List  # of cells: pieces that each receiver asks for
     asked_chirps: Any  # of each of these, what tells its wave; NONE where its segments do
     partly: Parts  # of cells: pieces that reach it, or a part of it, but not all of the block as far as is known
-    runs: Runs  # of blocks
+    runs: Runs  # of quadrants
     chirps: Chirps
     chirped: Parts  # of cells: those that reach it
-    everywhere: List  # of blocks: those that reach it
+    everywhere: List  # of quadrants: those that reach the block
     clear: Any  # least distance from what sends chirps: of the rays to PLACES of each block
     receiver2: Any  # and of those places themselves, squared
     begins: List  # of blocks: segments at whose start a far run begins
@@ -103,6 +103,10 @@ class Lists(NamedTuple):
     def cell(self, receivers: Receivers) -> Any:
         """The places of receivers' cells."""
         return receivers.cell * self.blocks + receivers.block
+
+    def quadrant(self, receivers: Receivers) -> Any:
+        """The places of receivers' quadrants."""
+        return quadrant(receivers.cell) * self.blocks + receivers.block
 
     def near(self, receivers: Receivers, silhouettes: Chords | None) -> Near | None:
         """The bodies beside the receivers' blocks."""
@@ -200,7 +204,7 @@ def _of_chirps(found: Lists, receivers: Receivers, at: Any) -> tuple[Any, Any]:
     active = receivers.active
     F = found.chirps.types.Float
     real, imag = F(0), F(0)
-    i, end = found.everywhere.bounds(receivers.block, active)
+    i, end = found.everywhere.bounds(found.quadrant(receivers), active)
     while active & (i < end):
         re, im = found.chirps.at(found.everywhere.item(i), u, v)
         real, imag = real + re, imag + im
@@ -263,7 +267,7 @@ def listed_sum(
 
     total: tuple[Any, ...] = (*sums[:5], F(margins.receiver2), F(nearest.distance2), nearest.segment)
     total = _of_parts(total, found.partly, tab, tell, receivers, cell)
-    total = _of_runs(total, found.runs, tell, active, block)
+    total = _of_runs(total, found.runs, tell, active, found.quadrant(receivers))
     real, imag, err_real, err_imag, rounding2, receiver2, nearest2, segment = total
     for ends, stop in ((found.begins, 0), (found.stops, 1)):
         re, im = _of_ends(fr, tab, k, ends, stop, active, block)

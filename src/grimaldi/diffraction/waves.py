@@ -8,18 +8,16 @@ import drjit as dr
 import mitsuba
 import numpy as np
 
-from grimaldi.diffraction.chirps import FARTHEST, PLACES, Chirps, Samples, fit, lattice_place, sampled
+from grimaldi.diffraction.chirps import FARTHEST, PLACES, QUADRANTS, Chirps, Samples, fit, place_of, sampled
 from grimaldi.diffraction.frame import Frame
 from grimaldi.diffraction.hierarchy import NONE
 from grimaldi.diffraction.lists import List, places
-from grimaldi.diffraction.model import LATTICE, Blocks
+from grimaldi.diffraction.model import Blocks
 from grimaldi.diffraction.search import Pairs, Search
-from grimaldi.diffraction.segment import Rule
-from grimaldi.diffraction.table import Table
 
 mi: Any = mitsuba  # the stubs refuse numbers where arrays are asked for
 
-FITS = 0.005  # of the tolerance: what chirps may leave of a piece's wave in the mean over a block
+FITS = 0.05  # of the tolerance: what all chirps of a block may leave of M in the mean, each as much as the others
 BEATS = 3.0  # turns, by which a piece's ends may be further apart in one place of a block than in another: beats
 # between those where waves are asked for would look like none
 AWAY = 0.7  # radii of a block, that rays to it pass by the piece at least: waves beside a ray change within pixels
@@ -33,7 +31,7 @@ class Waves(NamedTuple):
     """What is known of pairs' waves, and how near their pieces are to blocks."""
 
     chirps: Chirps
-    index: Any  # of the chirp of each pair; NONE if it has none
+    index: Any  # of each pair's chirp in each of QUADRANTS of its block, one pair after the other; NONE if it has none
     off2: Any  # of each chirp, as in `Fit`
     small: Any  # which of the pairs are left out
     left: Any  # of each block: what is left out of |M|
@@ -41,48 +39,64 @@ class Waves(NamedTuple):
     receiver2: Any  # and of those places themselves, squared
 
 
-def waves(search: Search, blocks: Blocks, frames: Frame, lattice: Frame, pairs: Pairs, wanted: Any) -> Waves:
-    """Of the wanted pairs; frames: of the rays to the middles of blocks, and to their lattices."""
+def waves(search: Search, blocks: Blocks, frames: Frame, at_places: Frame, pairs: Pairs, wanted: Any) -> Waves:
+    """Of the wanted pairs; frames: of the rays to the middles of blocks, and to their `lattice_and_middles`."""
     number, unit = dr.width(blocks.p), 2 * np.pi * search.tolerance
     curved = dr.gather(mi.Float, blocks.bend, pairs.block) > 0
     size = dr.full(mi.Float, dr.inf, len(wanted))  # of waves; infinite where they may change over a block
 
     pair = places(wanted & curved)
-    there = sampled(*_rays(search, frames, pairs, pair))
-    apart = there.ray2 > dr.square(OFF * _radius(blocks, pairs, pair))
+    block, piece = (dr.gather(mi.UInt32, of, pair) for of in pairs[:2])
+    there = sampled(frames.some(block), search.tab, search.k, search.rule, piece)
+    apart = there.ray2 > dr.square(OFF * dr.gather(mi.Float, blocks.radius, block))
     apart &= dr.gather(mi.Bool, wanted & curved, pair)
     dr.scatter(size, mi.Float(dr.sqrt(dr.square(there.real) + dr.square(there.imag))), pair, apart)
 
     pair = places(wanted & ~curved)
-    samples = sampled(*_rays(search, lattice, pairs, pair, PLACES))
+    block, piece = (dr.gather(mi.UInt32, of, pair) for of in pairs[:2])
+    samples = _samples(search, at_places, number, block, piece)
     found = fit(samples, len(pair), search.tab.types)
-    apart = found.ray2 > dr.square(AWAY * _radius(blocks, pairs, pair))
-    apart &= dr.gather(mi.Bool, wanted & ~curved, pair)
-    dr.scatter(size, mi.Float(dr.sqrt(found.size2)), pair, apart)
-
-    chirp = dr.full(mi.UInt32, NONE, len(wanted))
-    fits = apart & (found.off2 < (FITS * unit) ** 2) & (found.beats < BEATS)
-    dr.scatter(chirp, dr.arange(mi.UInt32, len(pair)), pair, fits)
+    radius = dr.gather(mi.Float, blocks.radius, block)
+    apart = found.ray2 > dr.square(AWAY * radius)
+    flat = dr.gather(mi.Bool, wanted & ~curved, pair)
+    dr.scatter(size, mi.Float(dr.sqrt(found.size2)), pair, flat & apart)
     small, left = _small(size / (SMALL * unit), pairs.block, number)
-    near = _nearest(samples, dr.gather(mi.UInt32, pairs.block, pair), number)
-    return Waves(found.chirps, chirp, mi.Float(found.off2), small, SMALL * search.tolerance * left, *near)
+    near = _nearest(samples, block, number)
+
+    # in quadrants, what is none over the whole block
+    allowed = (FITS * unit) ** 2 / mi.Float(dr.gather(mi.UInt64, sums(mi.UInt32(flat), block, number), block))
+    fits = apart & (found.off2 < allowed) & (found.beats < BEATS)
+    some = places(flat & ~fits & ~dr.gather(mi.Bool, small, pair))
+    entry = dr.arange(mi.UInt32, QUADRANTS * len(some))
+    of = entry % QUADRANTS
+    entry = dr.gather(mi.UInt32, some, entry // QUADRANTS)
+    block, piece = (dr.gather(mi.UInt32, v, entry) for v in (block, piece))
+    samples = _samples(search, at_places, number, block, piece, of)
+    parts = fit(samples, len(entry), search.tab.types, of)
+    fits_part = parts.ray2 > dr.square(0.5 * AWAY * dr.gather(mi.Float, radius, entry))
+    fits_part &= (
+        (parts.off2 < dr.gather(mi.Float, allowed, entry)) & (parts.beats < BEATS) & ~dr.gather(mi.Bool, fits, entry)
+    )
+    fits_part &= dr.gather(mi.Bool, flat, entry)
+
+    chirp = dr.full(mi.UInt32, NONE, QUADRANTS * len(wanted))
+    for i in range(QUADRANTS):
+        dr.scatter(chirp, dr.arange(mi.UInt32, len(pair)), QUADRANTS * pair + i, flat & fits)
+    own = dr.gather(mi.UInt32, pair, entry)
+    dr.scatter(chirp, len(pair) + dr.arange(mi.UInt32, len(entry)), QUADRANTS * own + of, fits_part)
+    chirps = found.chirps.and_those_of(parts.chirps)
+    off2 = dr.concat((mi.Float(found.off2), mi.Float(parts.off2)))
+    dr.eval(chirp, chirps.packets, off2)
+    return Waves(chirps, chirp, off2, small, SMALL * search.tolerance * left, *near)
 
 
-def _radius(blocks: Blocks, pairs: Pairs, pair: Any) -> Any:
-    """Of the blocks of some pairs."""
-    return dr.gather(mi.Float, blocks.radius, dr.gather(mi.UInt32, pairs.block, pair))
-
-
-def _rays(search: Search, frames: Frame, pairs: Pairs, pair: Any, each: int = 1) -> tuple[Frame, Table, Any, Rule, Any]:
-    """What `sampled` takes, of some pairs: along the ray to each block's middle, or to `each` of PLACES."""
-    index = dr.arange(mi.UInt32, each * len(pair))
-    of = index // each
-    own = dr.gather(mi.UInt32, pair, of)
-    at = dr.gather(mi.UInt32, pairs.block, own)
-    if each > 1:
-        at = at * (LATTICE * LATTICE) + lattice_place(index - each * of)
-    piece = dr.gather(mi.UInt32, pairs.piece, own)
-    return frames.some(at), search.tab, search.k, search.rule, piece
+def _samples(search: Search, frames: Frame, number: int, block: Any, piece: Any, of: Any | None = None) -> Samples:
+    """What pieces send to each of PLACES of blocks, of `number`, or `of` quadrants of theirs."""
+    index = dr.arange(mi.UInt32, PLACES * len(piece))
+    own = index // PLACES
+    block, piece = (dr.gather(mi.UInt32, v, own) for v in (block, piece))
+    at = place_of(block, index - PLACES * own, number, None if of is None else dr.gather(mi.UInt32, of, own))
+    return sampled(frames.some(at), search.tab, search.k, search.rule, piece)
 
 
 def _small(size: Any, block: Any, number: int) -> tuple[Any, Any]:
