@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 import grimaldi
 from grimaldi.bench import scenes
-from grimaldi.diffraction import waves
+from grimaldi.diffraction import bundles, waves
 from grimaldi.diffraction.arrays import types
 from grimaldi.diffraction.boundary import boundary
 from grimaldi.diffraction.frame import Frame
@@ -172,7 +172,7 @@ def test_fringes_that_lists_leave_out_are_too_fine_for_pixels():
 
 
 def test_chirps_tell_what_the_segments_of_pieces_do(monkeypatch):
-    """Nearly all that reaches blocks as a whole; a hundred of them to a hundredth of the tolerance each, at most."""
+    """Nearly all that reaches blocks as a whole; together they err by 0.05 of the tolerance in the mean, or bundled."""
     tolerance = 5e-2
     monkeypatch.setattr(scenes, "WAVELENGTH", 2.0)  # fringes wider than blocks
     floor = Floor(tolerance, "none")
@@ -187,6 +187,22 @@ def test_chirps_tell_what_the_segments_of_pieces_do(monkeypatch):
     off = abs(by_chirps - by_segments)
     assert 0 < off.max() < 0.3 * tolerance
     assert np.sqrt((off**2).mean()) < 0.1 * tolerance
+
+
+def test_bundles_are_fewer_chirps_that_tell_the_same(monkeypatch):
+    tolerance = 5e-2
+    monkeypatch.setattr(scenes, "WAVELENGTH", 2.0)
+    floor = Floor(tolerance, "none")
+    factor: Any = floor.light.beams[0].factor
+    places = np.random.default_rng(1).uniform(0, 64, (2, 2000))
+    by_bundles, _ = floor.both(floor.film, *places)
+    fewer = factor.single.lists(floor.film.blocks).everywhere
+    monkeypatch.setattr(bundles, "ROUNDS", 0)
+    by_each, _ = floor.both(floor.film, *places)
+    every = factor.single.lists(floor.film.blocks).everywhere
+    assert fewer.begin.numpy()[-1] < 0.8 * every.begin.numpy()[-1]
+    off = abs(by_bundles - by_each)
+    assert 0 < np.sqrt((off**2).mean()) < 0.05 * tolerance
 
 
 def test_lists_are_the_same_in_both_precisions():

@@ -94,9 +94,13 @@ def lists(search: Search, blocks: Blocks) -> Lists:
     unit = (CORNER * limit) ** 2 / FINE
     first, end = tab.range(pairs.piece)
     at_places = _frames(search, lattice_and_middles(blocks))
-    verdicts = _verdicts(search, blocks, at_places, pairs, tested, seen)
-    found = waves(search, blocks, frames, at_places, pairs, kept | ((verdicts[0] | verdicts[1]) != 0))
-    kept &= ~found.small
+    asked, reached = _verdicts(search, blocks, at_places, pairs, tested, seen)
+    all_of_it = (asked == 0) & (reached == EVERY)
+    kept |= all_of_it
+    asked, reached = (dr.select(all_of_it, 0, bits) for bits in (asked, reached))
+    dr.eval(kept, asked, reached)
+    found = waves(search, blocks, frames, at_places, pairs, kept | ((asked | reached) != 0), kept)
+    kept &= ~found.small & ~found.inside
     for i in range(QUADRANTS):
         chirp = dr.gather(mi.UInt32, found.index, QUADRANTS * dr.arange(mi.UInt32, len(kept)) + i, kept)
         told = kept & (chirp != NONE)
@@ -104,7 +108,7 @@ def lists(search: Search, blocks: Blocks) -> Lists:
     left = sums(dr.ceil(left2 / unit), pairs.block, number)
     dr.eval(begins, stops, first, end, kept)
     runs, everywhere = _in_quadrants(tab, pairs, number, kept, follows, found)
-    asked, asked_chirps, partly, chirped = _in_cells(pairs, number, verdicts, found, seen.passes)
+    asked, asked_chirps, partly, chirped = _in_cells(pairs, number, (asked, reached), found, seen.passes)
     return Lists(
         dr.opaque(mi.UInt32, number),
         asked,

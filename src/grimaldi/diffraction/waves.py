@@ -8,6 +8,7 @@ import drjit as dr
 import mitsuba
 import numpy as np
 
+from grimaldi.diffraction.bundles import bundled
 from grimaldi.diffraction.chirps import FARTHEST, PLACES, QUADRANTS, Chirps, Samples, fit, place_of, sampled
 from grimaldi.diffraction.frame import Frame
 from grimaldi.diffraction.hierarchy import NONE
@@ -33,61 +34,74 @@ class Waves(NamedTuple):
     chirps: Chirps
     index: Any  # of each pair's chirp in each of QUADRANTS of its block, one pair after the other; NONE if it has none
     off2: Any  # of each chirp, as in `Fit`
+    inside: Any  # which of the pairs are told by another's chirp
     small: Any  # which of the pairs are left out
     left: Any  # of each block: what is left out of |M|
     clear: Any  # least distance to pieces that may send chirps: of the rays to PLACES of each block
     receiver2: Any  # and of those places themselves, squared
 
 
-def waves(search: Search, blocks: Blocks, frames: Frame, at_places: Frame, pairs: Pairs, wanted: Any) -> Waves:
-    """Of the wanted pairs; frames: of the rays to the middles of blocks, and to their `lattice_and_middles`."""
+def waves(
+    search: Search, blocks: Blocks, frames: Frame, at_places: Frame, pairs: Pairs, wanted: Any, whole: Any
+) -> Waves:
+    """Of the wanted pairs; frames: of the rays to the middles of blocks, and to their `lattice_and_middles`.
+
+    whole: which of them reach all of their block.
+    """
     number, unit = dr.width(blocks.p), 2 * np.pi * search.tolerance
-    curved = dr.gather(mi.Float, blocks.bend, pairs.block) > 0
+    bends = dr.gather(mi.Float, blocks.bend, pairs.block) > 0
     size = dr.full(mi.Float, dr.inf, len(wanted))  # of waves; infinite where they may change over a block
+    _of_curved(size, search, blocks, frames, pairs, wanted & bends)
 
-    pair = places(wanted & curved)
-    block, piece = (dr.gather(mi.UInt32, of, pair) for of in pairs[:2])
-    there = sampled(frames.some(block), search.tab, search.k, search.rule, piece)
-    apart = there.ray2 > dr.square(OFF * dr.gather(mi.Float, blocks.radius, block))
-    apart &= dr.gather(mi.Bool, wanted & curved, pair)
-    dr.scatter(size, mi.Float(dr.sqrt(dr.square(there.real) + dr.square(there.imag))), pair, apart)
-
-    pair = places(wanted & ~curved)
+    pair = places(wanted & ~bends)
+    flat = dr.gather(mi.Bool, wanted & ~bends, pair)
     block, piece = (dr.gather(mi.UInt32, of, pair) for of in pairs[:2])
     samples = _samples(search, at_places, number, block, piece)
     found = fit(samples, len(pair), search.tab.types)
     radius = dr.gather(mi.Float, blocks.radius, block)
-    apart = found.ray2 > dr.square(AWAY * radius)
-    flat = dr.gather(mi.Bool, wanted & ~curved, pair)
-    dr.scatter(size, mi.Float(dr.sqrt(found.size2)), pair, flat & apart)
+    apart = flat & (found.ray2 > dr.square(AWAY * radius))
+    dr.scatter(size, mi.Float(dr.sqrt(found.size2)), pair, apart)
     small, left = _small(size / (SMALL * unit), pairs.block, number)
     near = _nearest(samples, block, number)
 
-    # in quadrants, what is none over the whole block
     allowed = (FITS * unit) ** 2 / mi.Float(dr.gather(mi.UInt64, sums(mi.UInt32(flat), block, number), block))
-    fits = apart & (found.off2 < allowed) & (found.beats < BEATS)
-    some = places(flat & ~fits & ~dr.gather(mi.Bool, small, pair))
-    entry = dr.arange(mi.UInt32, QUADRANTS * len(some))
-    of = entry % QUADRANTS
-    entry = dr.gather(mi.UInt32, some, entry // QUADRANTS)
-    block, piece = (dr.gather(mi.UInt32, v, entry) for v in (block, piece))
-    samples = _samples(search, at_places, number, block, piece, of)
-    parts = fit(samples, len(entry), search.tab.types, of)
-    fits_part = parts.ray2 > dr.square(0.5 * AWAY * dr.gather(mi.Float, radius, entry))
-    fits_part &= (
-        (parts.off2 < dr.gather(mi.Float, allowed, entry)) & (parts.beats < BEATS) & ~dr.gather(mi.Bool, fits, entry)
-    )
-    fits_part &= dr.gather(mi.Bool, flat, entry)
-
-    chirp = dr.full(mi.UInt32, NONE, QUADRANTS * len(wanted))
+    told = ~dr.gather(mi.Bool, small, pair)
+    fits = apart & told & (found.off2 < allowed) & (found.beats < BEATS)
+    some = places(fits & dr.gather(mi.Bool, whole, pair))
+    of_some, allowed_some = dr.gather(mi.UInt32, block, some), dr.gather(mi.Float, allowed, some)
+    chirps, off2, chirp = bundled(found, samples, some, of_some, allowed_some, number)
+    dr.eval(fits, chirp)
+    index = dr.full(mi.UInt32, NONE, QUADRANTS * len(wanted))
     for i in range(QUADRANTS):
-        dr.scatter(chirp, dr.arange(mi.UInt32, len(pair)), QUADRANTS * pair + i, flat & fits)
+        dr.scatter(index, chirp, QUADRANTS * pair + i, fits)
+    inside = dr.zeros(mi.Bool, len(wanted))
+    dr.scatter(inside, mi.Bool(True), pair, fits & (chirp == NONE))
+
+    # in quadrants, what is none over the whole block
+    entry = places(flat & told & ~fits)
+    of = dr.arange(mi.UInt32, QUADRANTS * len(entry)) % QUADRANTS
+    entry = dr.gather(mi.UInt32, entry, dr.arange(mi.UInt32, QUADRANTS * len(entry)) // QUADRANTS)
+    block, piece = (dr.gather(mi.UInt32, v, entry) for v in (block, piece))
+    parts = fit(_samples(search, at_places, number, block, piece, of), len(entry), search.tab.types, of)
+    fits = dr.gather(mi.Bool, flat & told & ~fits, entry)
+    fits &= parts.ray2 > dr.square(0.5 * AWAY * dr.gather(mi.Float, radius, entry))
+    fits &= (parts.off2 < dr.gather(mi.Float, allowed, entry)) & (parts.beats < BEATS)
     own = dr.gather(mi.UInt32, pair, entry)
-    dr.scatter(chirp, len(pair) + dr.arange(mi.UInt32, len(entry)), QUADRANTS * own + of, fits_part)
-    chirps = found.chirps.and_those_of(parts.chirps)
-    off2 = dr.concat((mi.Float(found.off2), mi.Float(parts.off2)))
-    dr.eval(chirp, chirps.packets, off2)
-    return Waves(chirps, chirp, off2, small, SMALL * search.tolerance * left, *near)
+    dr.scatter(index, dr.width(off2) + dr.arange(mi.UInt32, len(entry)), QUADRANTS * own + of, fits)
+    off2 = mi.Float(dr.concat((off2, parts.off2)))
+    chirps = chirps.and_those_of(parts.chirps)
+    dr.eval(index, inside, chirps.packets, off2)
+    return Waves(chirps, index, off2, inside, small, SMALL * search.tolerance * left, *near)
+
+
+def _of_curved(size: Any, search: Search, blocks: Blocks, frames: Frame, pairs: Pairs, wanted: Any) -> None:
+    """Put sizes of the wanted pairs, whose blocks are curved, where waves do not change over these."""
+    pair = places(wanted)
+    block, piece = (dr.gather(mi.UInt32, of, pair) for of in pairs[:2])
+    there = sampled(frames.some(block), search.tab, search.k, search.rule, piece)
+    apart = there.ray2 > dr.square(OFF * dr.gather(mi.Float, blocks.radius, block))
+    apart &= dr.gather(mi.Bool, wanted, pair)
+    dr.scatter(size, mi.Float(dr.sqrt(dr.square(there.real) + dr.square(there.imag))), pair, apart)
 
 
 def _samples(search: Search, frames: Frame, number: int, block: Any, piece: Any, of: Any | None = None) -> Samples:
