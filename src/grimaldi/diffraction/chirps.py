@@ -15,11 +15,12 @@ import drjit as dr
 import mitsuba
 import numpy as np
 
+from grimaldi.diffraction import fine
 from grimaldi.diffraction.arrays import Types
 from grimaldi.diffraction.edges import chain_wave
 from grimaldi.diffraction.frame import Frame
 from grimaldi.diffraction.hierarchy import least_detour
-from grimaldi.diffraction.model import ACROSS, LATTICE, Blocks, Receivers
+from grimaldi.diffraction.model import ACROSS, Receivers
 from grimaldi.diffraction.segment import Rule
 from grimaldi.diffraction.sines import of_turns
 from grimaldi.diffraction.table import Table
@@ -32,7 +33,6 @@ BETWEEN = [(u, v) for v in (-0.5, 0.5) for u in (-0.5, 0.5)]  # and by which tha
 PLACES = len(GRID) + len(BETWEEN)
 QUADRANTS = 4
 PACKETS = 5
-CELLS, CORNERS = ACROSS * ACROSS, LATTICE * LATTICE  # of a block
 FARTHEST = 1e30  # square of distances, for no distance
 
 
@@ -103,40 +103,15 @@ def sampled(fr: Frame, tab: Table, k: Any, rule: Rule, piece: Any) -> Samples:
     return Samples(*found)
 
 
-def lattice_and_middles(blocks: Blocks) -> Any:
-    """Receivers at places of blocks (Float64): the lattice of each, then the middles of each one's cells.
-
-    The film sees planes at a slant: middles are told by quadratics through the corners about them.
-    """
-    weights = {0: (0.375, 0.75, -0.125), 1: (-0.125, 0.75, 0.375)}
-    middles = dr.arange(mi.UInt32, CELLS * dr.width(blocks.p))
-    block = middles // CELLS
-    cell = middles - block * CELLS
-    x, y = cell % ACROSS, cell // ACROSS
-    first = block * CORNERS + (y // 2 * LATTICE + x // 2) * 2
-    middle = dr.zeros(type(blocks.lattice), len(middles))
-    for n in range(3):
-        for m in range(3):
-            of_row, of_column = (dr.select((i & 1) == 0, weights[0][j], weights[1][j]) for i, j in ((y, n), (x, m)))
-            corner = dr.gather(type(blocks.lattice), blocks.lattice, first + n * LATTICE + m)
-            middle += of_row * of_column * corner
-    return type(middle)(*(dr.concat((a, b)) for a, b in zip(blocks.lattice, middle, strict=True)))
-
-
-def place_of(block: Any, i: Any, number: int, of: Any | None = None) -> Any:
-    """Where in `lattice_and_middles` the i-th of PLACES of one of `number` blocks is, or of one of its quadrants."""
-    half = ACROSS // 2
+def place_of(block: Any, i: Any, of: Any | None = None) -> Any:
+    """Where the i-th of PLACES of blocks, or `of` one of their quadrants, stands among `fine.Fine`."""
     column, row = (
-        dr.gather(type(i), type(i)([int(half * (place[axis] + 1)) for place in (*GRID, *BETWEEN)]), i)
+        dr.gather(type(i), type(i)([int(ACROSS // 2 * (place[axis] + 1)) for place in (*GRID, *BETWEEN)]), i)
         for axis in (0, 1)
     )
     if of is None:
-        return block * CORNERS + row * LATTICE + column
-    # halved, places on the lattice stay on it, those between are the middles of cells
-    column, row = column + (of & 1) * ACROSS, row + (of >> 1) * ACROSS
-    corner = block * CORNERS + (row >> 1) * LATTICE + (column >> 1)
-    middle = number * CORNERS + block * CELLS + (row >> 1) * ACROSS + (column >> 1)
-    return dr.select(i < len(GRID), corner, middle)
+        return fine.place(block, 2 * row, 2 * column)
+    return fine.place(block, row + ACROSS * (of >> 1), column + ACROSS * (of & 1))
 
 
 class Fit(NamedTuple):

@@ -13,13 +13,15 @@ import drjit as dr
 import mitsuba
 import numpy as np
 
-from grimaldi.diffraction.chirps import QUADRANTS, lattice_and_middles, quadrant
+from grimaldi.diffraction.chirps import QUADRANTS, quadrant
 from grimaldi.diffraction.corners import Corner, corner, slopes
 from grimaldi.diffraction.edges import cut_off, sounds
+from grimaldi.diffraction.fine import Fine, place
+from grimaldi.diffraction.fine import corner as corner_place
 from grimaldi.diffraction.frame import Frame, constant, frame
 from grimaldi.diffraction.grazing import Near, near, other_than, worth
 from grimaldi.diffraction.hierarchy import NONE, least_detour
-from grimaldi.diffraction.lists import List, Lists, Parts, Runs, places
+from grimaldi.diffraction.lists import FINELY, INNER, List, Lists, Parts, Runs, places
 from grimaldi.diffraction.model import ACROSS, LATTICE, Blocks, Receivers
 from grimaldi.diffraction.search import Pairs, Search
 from grimaldi.diffraction.table import Piece, Table
@@ -33,6 +35,7 @@ CORNER = 0.007  # of the tolerance: |M| of a corner that is left out
 FINE = 1 << 16  # parts of its square, in which it is counted: sums of whole numbers are the same in any order
 WEAK = 0.3  # of the tolerance: |M| of an end that grows evenly between corners of cells which it reaches or not
 FAINT = 0.2  # and of one at all four corners of a cell
+STRONG = 0.5  # and of one that grows evenly between INNER × INNER places of a cell
 REMOTE = 1.5  # radii of a block, that such a piece is away from it at least
 ALL = (1 << ACROSS * ACROSS) - 1  # cells
 EVERY = (1 << LATTICE * LATTICE) - 1  # corners
@@ -51,6 +54,26 @@ class _Seen(NamedTuple):
     start: Any  # C φ'/ψ' at its ends
     stop: Any
     passes: Any  # whether the way to the block grazes another body's silhouette
+
+
+class _Verdicts(NamedTuple):
+    """Of pairs that are tested, a bit for each cell where to ask at every receiver, or where to look more finely; and
+    for each corner of cells that they reach."""
+
+    asked: Any
+    finely: Any
+    reached: Any
+
+    @property
+    def any(self) -> Any:
+        """Which pairs are on some list of cells."""
+        return (self.asked | self.finely | self.reached) != 0
+
+    def but(self, pairs: Any) -> _Verdicts:
+        """Those of others."""
+        found = _Verdicts(*(dr.select(pairs, 0, bits) for bits in self))
+        dr.eval(*found)
+        return found
 
 
 def lists(search: Search, blocks: Blocks) -> Lists:
@@ -93,13 +116,13 @@ def lists(search: Search, blocks: Blocks) -> Lists:
     left2 += dr.select(stops & ~strong[1], dr.square(seen.stop), 0)
     unit = (CORNER * limit) ** 2 / FINE
     first, end = tab.range(pairs.piece)
-    at_places = _frames(search, lattice_and_middles(blocks))
-    asked, reached = _verdicts(search, blocks, at_places, pairs, tested, seen)
-    all_of_it = (asked == 0) & (reached == EVERY)
-    kept |= all_of_it
-    asked, reached = (dr.select(all_of_it, 0, bits) for bits in (asked, reached))
-    dr.eval(kept, asked, reached)
-    found = waves(search, blocks, frames, at_places, pairs, kept | ((asked | reached) != 0), kept)
+    finer = Fine.of(search, blocks)
+    verdicts = _verdicts(search, blocks, finer, pairs, tested, seen)
+    whole = (verdicts.asked == 0) & (verdicts.finely == 0) & (verdicts.reached == EVERY)
+    kept |= whole
+    verdicts = verdicts.but(whole)
+    dr.eval(kept)
+    found = waves(search, blocks, frames, finer.frames, pairs, kept | verdicts.any, kept)
     kept &= ~found.small & ~found.inside
     for i in range(QUADRANTS):
         chirp = dr.gather(mi.UInt32, found.index, QUADRANTS * dr.arange(mi.UInt32, len(kept)) + i, kept)
@@ -108,7 +131,7 @@ def lists(search: Search, blocks: Blocks) -> Lists:
     left = sums(dr.ceil(left2 / unit), pairs.block, number)
     dr.eval(begins, stops, first, end, kept)
     runs, everywhere = _in_quadrants(tab, pairs, number, kept, follows, found)
-    asked, asked_chirps, partly, chirped = _in_cells(pairs, number, (asked, reached), found, seen.passes)
+    asked, asked_chirps, partly, chirped = _in_cells(search, blocks, finer, pairs, verdicts, found, seen.passes)
     return Lists(
         dr.opaque(mi.UInt32, number),
         asked,
@@ -166,13 +189,15 @@ def _in_quadrants(tab: Table, pairs: Pairs, number: int, kept: Any, follows: Any
 
 
 def _in_cells(
-    pairs: Pairs, number: int, verdicts: tuple[Any, Any], found: Waves, passes: Any
+    search: Search, blocks: Blocks, fine: Fine, pairs: Pairs, verdicts: _Verdicts, found: Waves, passes: Any
 ) -> tuple[List, Any, Parts, Parts]:
-    """Those lists of cells of `number` blocks that `Lists` has, by what `_verdicts` says of pairs."""
-    cells = ACROSS * ACROSS
-    pair = places(((verdicts[0] | verdicts[1]) != 0) & ~found.small)
-    asked, reached, block, piece = (dr.gather(mi.UInt32, v, pair) for v in (*verdicts, pairs.block, pairs.piece))
-    dr.eval(asked, reached, block, piece)
+    """Those lists of cells that `Lists` has, by what `_verdicts` says of pairs."""
+    cells, number = ACROSS * ACROSS, dr.width(blocks.p)
+    pair = places(verdicts.any & ~found.small)
+    asked, finely, reached, block, piece = (
+        dr.gather(mi.UInt32, v, pair) for v in (*verdicts, pairs.block, pairs.piece)
+    )
+    dr.eval(asked, finely, reached, block, piece)
     count = dr.opaque(mi.UInt32, len(pair))
     index = dr.arange(mi.UInt32, cells * len(pair))
     cell = index // count
@@ -185,8 +210,15 @@ def _in_cells(
     of = dr.gather(mi.UInt32, pair, entry)
     chirp = dr.gather(mi.UInt32, found.index, QUADRANTS * of + quadrant(cell))
     by_chirp = dr.select(dr.gather(mi.Bool, passes, of), NONE, chirp)  # what passes silhouettes is told apart by sides
-    reaches, told = ~asks & (corners > 0), chirp != NONE
+    looks = ((dr.gather(mi.UInt32, finely, entry) >> cell) & 1) != 0
+    reaches, told = ~asks & (looks | (corners > 0)), chirp != NONE
     dr.eval(corners, asks, chirp, by_chirp, reaches, told, place, own)
+    some: Any = dr.compress(looks)
+    if len(some):
+        its_block, its_piece = (dr.gather(mi.UInt32, v, dr.gather(mi.UInt32, entry, some)) for v in (block, piece))
+        bits = _finely(search, blocks, fine, its_block, its_piece, dr.gather(mi.UInt32, cell, some))
+        dr.scatter(corners, bits, some)
+        dr.eval(corners)
 
     def parts(chosen: Any, items: Any) -> Parts:
         return Parts(List.of(chosen, place, cells * number, items), dr.gather(mi.UInt32, corners, places(chosen)))
@@ -197,6 +229,32 @@ def _in_cells(
         parts(reaches & ~told, own),
         parts(reaches & told, chirp),
     )
+
+
+def _finely(search: Search, blocks: Blocks, fine: Fine, block: Any, piece: Any, cell: Any) -> Any:
+    """What of cells of flat blocks pieces reach, by rays to INNER × INNER places of each, as in `Parts`."""
+    found = dr.full(mi.UInt32, FINELY, len(cell))
+    index = dr.arange(mi.UInt32, INNER * INNER * len(cell))
+    of = index // (INNER * INNER)
+    bit = index - INNER * INNER * of
+    block, piece, cell = (dr.gather(mi.UInt32, v, of) for v in (block, piece, cell))
+    y = cell // ACROSS
+    at = place(block, 2 * y + bit // INNER, 2 * (cell - y * ACROSS) + bit % INNER)
+    acts = _reaches(search, fine, at, dr.gather(type(blocks.n), blocks.n, block), piece)
+    dr.scatter_add(found, dr.select(acts, mi.UInt32(1) << bit, 0), of)
+    dr.eval(found)
+    return found
+
+
+def _reaches(search: Search, fine: Fine, at: Any, n: Any, piece: Any) -> Any:
+    """Whether pieces reach some of the places, normals n."""
+    tab, probe = search.tab, search.probe
+    assert probe is not None
+    whole = tab.piece(piece)
+    acts = sounds(fine.frames.some(at), whole, tab.types.Vector(n))
+    x = mi.Point3f(whole.middle + constant(tab.types.Vector, tab.centre))
+    p = mi.Point3f(dr.gather(type(fine.p), fine.p, at))
+    return acts & probe.reaches(x, whole, p + probe.epsilon(p) * n, acts)
 
 
 def _frames(search: Search, p: Any) -> Frame:
@@ -345,58 +403,65 @@ def _along(search: Search, fr: Frame, piece: Piece, radius: Any) -> tuple[Any, .
     return far, inner2, start, stop
 
 
-def _verdicts(search: Search, blocks: Blocks, frames: Frame, pairs: Pairs, tested: Any, seen: _Seen) -> tuple[Any, Any]:
-    """Of pieces that are `tested`, the cells of blocks where to ask for them, and the corners of cells they reach.
+def _verdicts(search: Search, blocks: Blocks, fine: Fine, pairs: Pairs, tested: Any, seen: _Seen) -> _Verdicts:
+    """What is known of pieces that are `tested`, by a ray to each corner on the block's own surface.
 
-    By a ray to each corner on the block's own surface. If they differ, and the piece is not too weak for that, a cell
-    is to be asked where its own do, or lie on another surface; and all of them for what passes other silhouettes.
+    Where those nearest to a cell differ, a weak piece grows evenly between them; others are looked at more finely,
+    or asked for at every receiver if they are strong, the block is curved, or they pass other silhouettes.
     """
-    asked, reached = dr.zeros(mi.UInt32, len(tested)), dr.zeros(mi.UInt32, len(tested))
+    verdicts = _Verdicts(*(dr.zeros(mi.UInt32, len(tested)) for _ in range(3)))
     pair: Any = dr.compress(tested)
     if len(pair) == 0:
-        return asked, reached
+        return verdicts
     if search.probe is None:
-        dr.scatter(asked, mi.UInt32(ALL), pair)
-        return asked, reached
+        dr.scatter(verdicts.asked, mi.UInt32(ALL), pair)
+        return verdicts
     members = dr.gather(mi.UInt32, blocks.members, dr.gather(mi.UInt32, pairs.block, pair))
     weak = dr.gather(mi.Bool, seen.weak, pair)
     first = members & dr.select(weak & ((members & COARSE) != 0), mi.UInt32(COARSE), EVERY)
-    bits = _reached(search, blocks, frames, pairs, pair, first)
+    bits = _reached(search, blocks, fine, pairs, pair, first)
     differ = (bits != 0) & (bits != first)
     bits = dr.select(bits == first, members, bits)
-    bits |= _reached(search, blocks, frames, pairs, pair, dr.select(differ, members & ~first, 0))
+    bits |= _reached(search, blocks, fine, pairs, pair, dr.select(differ, members & ~first, 0))
     filled = _filled(bits, members)
     passes = dr.gather(mi.Bool, seen.passes, pair)
     uniform = (bits == 0) | (bits == members)
     strong = ~weak & (~uniform | passes)
-    faint = dr.select(weak, EVERY, _faint(search, frames, pairs, pair, strong))
-    ask = mi.UInt32(0)
+    left = _left(search, fine.frames, pairs, pair, strong)
+    faint = dr.select(weak, EVERY, left[0])
+    bends = dr.gather(mi.Float, blocks.bend, dr.gather(mi.UInt32, pairs.block, pair)) > 0
+    ask, finely = mi.UInt32(0), mi.UInt32(0)
     for y in range(ACROSS):
         for x in range(ACROSS):
             own = sum(1 << ((y + dy) * LATTICE + x + dx) for dy in (0, 1) for dx in (0, 1))
             same = ((filled & own) == own) | ((filled & own) == 0)
             clear = ~passes & same
-            ask |= dr.select(((faint & own) == own) | clear, 0, 1 << (y * ACROSS + x))
-    dr.scatter(asked, ask, pair)
-    dr.scatter(reached, filled, pair)
-    dr.eval(asked, reached)
-    return asked, reached
+            differs = ~(((faint & own) == own) | clear)
+            tells = ~passes & ~bends & ((left[1] & own) == own)
+            ask |= dr.select(differs & ~tells, 1 << (y * ACROSS + x), 0)
+            finely |= dr.select(differs & tells, 1 << (y * ACROSS + x), 0)
+    for verdict, of_pairs in zip(verdicts, (ask, finely, filled), strict=True):
+        dr.scatter(verdict, of_pairs, pair)
+    dr.eval(*verdicts)
+    return verdicts
 
 
-def _faint(search: Search, frames: Frame, pairs: Pairs, pair: Any, some: Any) -> Any:
-    """At which corners of cells a chain cut off on the pieces of some pairs leaves little; a bit for each."""
+def _left(search: Search, frames: Frame, pairs: Pairs, pair: Any, some: Any) -> tuple[Any, Any]:
+    """At which corners of cells a chain cut off on the pieces of some pairs leaves less than FAINT of the tolerance,
+    and less than STRONG; a bit for each."""
     tab, corners = search.tab, LATTICE * LATTICE
-    bits = dr.zeros(mi.UInt32, len(pair))
     some = places(some)
     index = dr.arange(mi.UInt32, len(some) * corners)
     of = index // corners
     place, entry = index - of * corners, dr.gather(mi.UInt32, some, of)
     own = dr.gather(mi.UInt32, pair, entry)
-    at = dr.gather(mi.UInt32, pairs.block, own) * corners + place
+    at = corner_place(dr.gather(mi.UInt32, pairs.block, own), place)
     left = cut_off(frames.some(at), tab.piece(dr.gather(mi.UInt32, pairs.piece, own)), search.k)
-    dr.scatter_add(bits, dr.select(left < FAINT * search.tolerance, mi.UInt32(1) << place, 0), entry)
-    dr.eval(bits)
-    return bits
+    found = dr.zeros(mi.UInt32, len(pair)), dr.zeros(mi.UInt32, len(pair))
+    for bits, most in zip(found, (FAINT, STRONG), strict=True):
+        dr.scatter_add(bits, dr.select(left < most * search.tolerance, mi.UInt32(1) << place, 0), entry)
+    dr.eval(*found)
+    return found
 
 
 def _filled(bits: Any, members: Any) -> Any:
@@ -415,23 +480,17 @@ def _filled(bits: Any, members: Any) -> Any:
     return bits
 
 
-def _reached(search: Search, blocks: Blocks, frames: Frame, pairs: Pairs, pair: Any, asked: Any) -> Any:
+def _reached(search: Search, blocks: Blocks, fine: Fine, pairs: Pairs, pair: Any, asked: Any) -> Any:
     """Which of the `asked` corners of cells the pieces of pairs reach; a bit for each."""
-    tab, probe, corners = search.tab, search.probe, LATTICE * LATTICE
-    assert probe is not None
+    corners = LATTICE * LATTICE
     index = dr.arange(mi.UInt32, len(pair) * corners)
     of = index // corners
     some = places(((dr.gather(mi.UInt32, asked, of) >> (index - of * corners)) & 1) != 0)
     of = some // corners
     place, own = some - of * corners, dr.gather(mi.UInt32, pair, of)
-    at = dr.gather(mi.UInt32, pairs.block, own) * corners + place
-    p = dr.gather(type(blocks.lattice), blocks.lattice, at)
-    n = dr.gather(type(blocks.normals), blocks.normals, at)
-    piece = tab.piece(dr.gather(mi.UInt32, pairs.piece, own))
-    acts = sounds(frames.some(at), piece, tab.types.Vector(n))
-    x = mi.Point3f(piece.middle + constant(tab.types.Vector, tab.centre))
-    q = mi.Point3f(p)
-    acts &= probe.reaches(x, piece, q + probe.epsilon(q) * n, acts)
+    block = dr.gather(mi.UInt32, pairs.block, own)
+    n = dr.gather(type(blocks.normals), blocks.normals, block * corners + place)
+    acts = _reaches(search, fine, corner_place(block, place), n, dr.gather(mi.UInt32, pairs.piece, own))
     bits = dr.zeros(mi.UInt32, len(pair))
     dr.scatter_add(bits, dr.select(acts, mi.UInt32(1) << place, 0), of)
     dr.eval(bits)

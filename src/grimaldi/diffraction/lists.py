@@ -62,9 +62,15 @@ class Runs(NamedTuple):
     last: List
 
 
+INNER = 3  # places across a cell, and a mark of what is told by these
+FINELY = 1 << INNER * INNER
+
+
 class Parts(NamedTuple):
-    """Pieces that reach cells in part, with a bit for each corner that they reach: between them what they send grows
-    evenly."""
+    """Pieces that reach cells in part: between places that they reach or not, what they send grows evenly.
+
+    A bit for each corner of a cell, row by row; or, marked FINELY, for each of INNER × INNER places of it.
+    """
 
     pieces: List
     corners: Any
@@ -72,10 +78,14 @@ class Parts(NamedTuple):
     def share(self, i: Any, receivers: Receivers) -> Any:
         """How much of the piece at a place reaches receivers."""
         bits = dr.gather(mi.UInt32, self.corners, i)
-        near, far = (
-            dr.lerp(mi.Float((bits >> row) & 1), mi.Float((bits >> (row + 1)) & 1), receivers.u) for row in (0, 2)
-        )
-        return dr.lerp(near, far, receivers.v)
+        finely = bits >= FINELY
+        parts, step = dr.select(finely, mi.UInt32(INNER - 1), 1), dr.select(finely, mi.UInt32(INNER), 2)
+        u, v = receivers.u * mi.Float(parts), receivers.v * mi.Float(parts)
+        column, row = (dr.minimum(mi.UInt32(x), parts - 1) for x in (u, v))
+        bits = bits >> (row * step + column)
+        u, v = u - mi.Float(column), v - mi.Float(row)
+        near, far = (dr.lerp(mi.Float(b & 1), mi.Float((b >> 1) & 1), u) for b in (bits, bits >> step))
+        return dr.lerp(near, far, v)
 
 
 class Lists(NamedTuple):

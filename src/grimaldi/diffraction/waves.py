@@ -44,7 +44,7 @@ class Waves(NamedTuple):
 def waves(
     search: Search, blocks: Blocks, frames: Frame, at_places: Frame, pairs: Pairs, wanted: Any, whole: Any
 ) -> Waves:
-    """Of the wanted pairs; frames: of the rays to the middles of blocks, and to their `lattice_and_middles`.
+    """Of the wanted pairs; frames: of the rays to the middles of blocks, and to `Fine` places.
 
     whole: which of them reach all of their block.
     """
@@ -56,7 +56,7 @@ def waves(
     pair = places(wanted & ~bends)
     flat = dr.gather(mi.Bool, wanted & ~bends, pair)
     block, piece = (dr.gather(mi.UInt32, of, pair) for of in pairs[:2])
-    samples = _samples(search, at_places, number, block, piece)
+    samples = _samples(search, at_places, block, piece)
     found = fit(samples, len(pair), search.tab.types)
     radius = dr.gather(mi.Float, blocks.radius, block)
     apart = flat & (found.ray2 > dr.square(AWAY * radius))
@@ -82,7 +82,7 @@ def waves(
     of = dr.arange(mi.UInt32, QUADRANTS * len(entry)) % QUADRANTS
     entry = dr.gather(mi.UInt32, entry, dr.arange(mi.UInt32, QUADRANTS * len(entry)) // QUADRANTS)
     block, piece = (dr.gather(mi.UInt32, v, entry) for v in (block, piece))
-    parts = fit(_samples(search, at_places, number, block, piece, of), len(entry), search.tab.types, of)
+    parts = fit(_samples(search, at_places, block, piece, of), len(entry), search.tab.types, of)
     fits = dr.gather(mi.Bool, flat & told & ~fits, entry)
     fits &= parts.ray2 > dr.square(0.5 * AWAY * dr.gather(mi.Float, radius, entry))
     fits &= (parts.off2 < dr.gather(mi.Float, allowed, entry)) & (parts.beats < BEATS)
@@ -104,12 +104,12 @@ def _of_curved(size: Any, search: Search, blocks: Blocks, frames: Frame, pairs: 
     dr.scatter(size, mi.Float(dr.sqrt(dr.square(there.real) + dr.square(there.imag))), pair, apart)
 
 
-def _samples(search: Search, frames: Frame, number: int, block: Any, piece: Any, of: Any | None = None) -> Samples:
-    """What pieces send to each of PLACES of blocks, of `number`, or `of` quadrants of theirs."""
+def _samples(search: Search, frames: Frame, block: Any, piece: Any, of: Any | None = None) -> Samples:
+    """What pieces send to each of PLACES of blocks, or `of` quadrants of theirs."""
     index = dr.arange(mi.UInt32, PLACES * len(piece))
     own = index // PLACES
     block, piece = (dr.gather(mi.UInt32, v, own) for v in (block, piece))
-    at = place_of(block, index - PLACES * own, number, None if of is None else dr.gather(mi.UInt32, of, own))
+    at = place_of(block, index - PLACES * own, None if of is None else dr.gather(mi.UInt32, of, own))
     return sampled(frames.some(at), search.tab, search.k, search.rule, piece)
 
 

@@ -21,7 +21,7 @@ Integers = NDArray[np.int64]
 
 SIDE = 16  # pixels
 MOST = 3  # blocks of a square
-ROOM = 1.5  # times what the samples of a curved surface differ by
+ROOM = 2.2  # times what the samples of a curved surface differ by
 DEEPEST = 4.0  # times the distance of a sample, that its plane may be seen at within a square
 PLANE = 1e-4  # what a point may lie off a plane, of the block's radius; and a normal off another
 
