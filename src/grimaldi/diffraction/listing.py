@@ -35,7 +35,7 @@ CORNER = 0.007  # of the tolerance: |M| of a corner that is left out
 FINE = 1 << 16  # parts of its square, in which it is counted: sums of whole numbers are the same in any order
 WEAK = 0.3  # of the tolerance: |M| of an end that grows evenly between corners of cells which it reaches or not
 FAINT = 0.2  # and of one at all four corners of a cell
-STRONG = 0.5  # and of one that grows evenly between INNER × INNER places of a cell
+STRONG = 0.5  # and of one that grows evenly between INNER × INNER places of it, or corners on a curved block
 REMOTE = 1.5  # radii of a block, that such a piece is away from it at least
 ALL = (1 << ACROSS * ACROSS) - 1  # cells
 EVERY = (1 << LATTICE * LATTICE) - 1  # corners
@@ -407,7 +407,7 @@ def _verdicts(search: Search, blocks: Blocks, fine: Fine, pairs: Pairs, tested: 
     """What is known of pieces that are `tested`, by a ray to each corner on the block's own surface.
 
     Where those nearest to a cell differ, a weak piece grows evenly between them; others are looked at more finely,
-    or asked for at every receiver if they are strong, the block is curved, or they pass other silhouettes.
+    or asked for at every receiver if they are strong or pass other silhouettes.
     """
     verdicts = _Verdicts(*(dr.zeros(mi.UInt32, len(tested)) for _ in range(3)))
     pair: Any = dr.compress(tested)
@@ -428,8 +428,8 @@ def _verdicts(search: Search, blocks: Blocks, fine: Fine, pairs: Pairs, tested: 
     uniform = (bits == 0) | (bits == members)
     strong = ~weak & (~uniform | passes)
     left = _left(search, fine.frames, pairs, pair, strong)
-    faint = dr.select(weak, EVERY, left[0])
     bends = dr.gather(mi.Float, blocks.bend, dr.gather(mi.UInt32, pairs.block, pair)) > 0
+    faint = dr.select(weak, EVERY, dr.select(bends, left[1], left[0]))
     ask, finely = mi.UInt32(0), mi.UInt32(0)
     for y in range(ACROSS):
         for x in range(ACROSS):
