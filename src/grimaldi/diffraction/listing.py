@@ -420,9 +420,9 @@ def _verdicts(search: Search, blocks: Blocks, fine: Fine, pairs: Pairs, tested: 
     weak = dr.gather(mi.Bool, seen.weak, pair)
     first = members & dr.select(weak & ((members & COARSE) != 0), mi.UInt32(COARSE), EVERY)
     bits = _reached(search, blocks, fine, pairs, pair, first)
-    differ = (bits != 0) & (bits != first)
-    bits = dr.select(bits == first, members, bits)
-    bits |= _reached(search, blocks, fine, pairs, pair, dr.select(differ, members & ~first, 0))
+    told, reached = _between(bits, first)
+    bits |= reached & members
+    bits |= _reached(search, blocks, fine, pairs, pair, members & ~first & ~told)
     filled = _filled(bits, members)
     passes = dr.gather(mi.Bool, seen.passes, pair)
     uniform = (bits == 0) | (bits == members)
@@ -462,6 +462,25 @@ def _left(search: Search, frames: Frame, pairs: Pairs, pair: Any, some: Any) -> 
         dr.scatter_add(bits, dr.select(left < most * search.tolerance, mi.UInt32(1) << place, 0), entry)
     dr.eval(*found)
     return found
+
+
+def _between(bits: Any, known: Any) -> tuple[Any, Any]:
+    """Which corners of a lattice lie between others that are alike, of those known; and which of these are reached.
+
+    In each quarter by its own four; everywhere if all known ones are alike.
+    """
+    alike, none = (bits == known) & (known != 0), bits == 0
+    told, reached = dr.select(alike | none, mi.UInt32(EVERY), 0), dr.select(alike, mi.UInt32(EVERY), 0)
+    half = ACROSS // 2
+    for y in (0, half):
+        for x in (0, half):
+            own = sum(1 << ((y + dy) * LATTICE + x + dx) for dy in range(half + 1) for dx in range(half + 1))
+            four = own & COARSE
+            every, any_ = (bits & four) == four, (bits & four) != 0
+            same = ((known & four) == four) & (every | ~any_)
+            told |= dr.select(same, own, 0)
+            reached |= dr.select(same & every, own, 0)
+    return told, reached
 
 
 def _filled(bits: Any, members: Any) -> Any:
