@@ -13,7 +13,7 @@ from grimaldi.diffraction.model import OUTSIDE, Evaluate, Factor, Grouped, Recei
 from grimaldi.engine.blocks import Squares
 from grimaldi.engine.frozen import Recording, frozen
 
-FEWEST = 127  # receivers: of as many as there are of something else, or one, each would be recorded anew
+FEWEST = 31  # receivers: of as many as there are of something else, or one, each would be recorded anew
 
 Ask = Callable[[Any, Any, Receivers], Factor]
 """ask(x, y, receivers): M at receivers that are seen at places of the film [pixels], Float64, evaluated."""
