@@ -12,6 +12,7 @@ import mitsuba
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.interpolate import RegularGridInterpolator
 
 import grimaldi
 from grimaldi.bench import scenes
@@ -20,7 +21,7 @@ from grimaldi.diffraction.arrays import types
 from grimaldi.diffraction.boundary import boundary
 from grimaldi.diffraction.frame import Frame
 from grimaldi.diffraction.hierarchy import layout, least_detour
-from grimaldi.diffraction.lists import listed_sum
+from grimaldi.diffraction.lists import FINELY, INNER, List, Parts, listed_sum
 from grimaldi.diffraction.model import OUTSIDE, Evaluate, Factor, Options, Receivers
 from grimaldi.diffraction.reach import reach
 from grimaldi.engine.asking import Recordings, ask
@@ -169,6 +170,21 @@ def test_fringes_that_lists_leave_out_are_too_fine_for_pixels():
     at_points, of_means = np.sqrt((abs(off) ** 2).mean()), np.sqrt((abs(off.mean(axis=1)) ** 2).mean())
     assert at_points > 0.2 * tolerance
     assert of_means < 0.25 * at_points
+
+
+@pytest.mark.parametrize("across", [2, INNER])
+def test_what_reaches_a_cell_in_part_grows_evenly_between_places(across):
+    """By SciPy's own linear interpolation of the bits."""
+    rng = np.random.default_rng(across)
+    bits = rng.integers(0, 2, (across, across))
+    u, v = rng.uniform(0, 1, (2, 500))
+    mark = FINELY if across == INNER else 0
+    index = dr.zeros(mi.UInt32, 500)
+    parts = Parts(List(index, index), mi.UInt32(int((bits.ravel() << np.arange(across**2)).sum()) | mark))
+    receivers = Receivers(mi.Point3d(0), mi.Vector3f(0), mi.Bool(True), None, None, mi.Float(u), mi.Float(v))
+    places = np.linspace(0, 1, across)
+    expected = RegularGridInterpolator((places, places), bits.astype(float))(np.stack([v, u], axis=1))
+    np.testing.assert_allclose(parts.share(index, receivers).numpy(), expected, atol=1e-5)
 
 
 def test_chirps_tell_what_the_segments_of_pieces_do(monkeypatch):
