@@ -26,31 +26,33 @@ class Recording:
 
     def __init__(self) -> None:
         self._model: Evaluate | None = None  # while it is asked
-        self._replayed = dr.freeze(self._asked, state_fn=lambda *_: held(self._model), limit=KEPT, warn_after=1 << 31)
+        self._state: tuple[Any, ...] = ()
+        self._replayed = dr.freeze(self._asked, state_fn=lambda *_: self._state, limit=KEPT, warn_after=1 << 31)
 
     def _asked(self, *receivers: Any) -> tuple[Any, ...]:
         assert self._model is not None
         return tuple(mi.Float64(v) for v in self._model(Receivers(*receivers)))
 
-    def ask(self, model: Evaluate, receivers: Receivers, again: bool) -> tuple[Any, ...]:
-        """M by the model; `again`: whether it may be replayed."""
-        self._model = model
+    def ask(self, model: Evaluate, state: tuple[Any, ...], receivers: Receivers, again: bool) -> tuple[Any, ...]:
+        """M by the model, which holds what is in `state`; `again`: whether it may be replayed."""
+        self._model, self._state = model, state
         try:
             return (self._replayed if again else self._asked)(*receivers)
         finally:
-            self._model = None
+            self._model, self._state = None, ()
 
 
 def frozen(model: Evaluate, recording: Recording | None = None) -> Evaluate:
     """The same model, evaluated at receivers: Float64 arrays."""
     recording = recording or Recording()
-    shapes = sum(len(part.shapes()) for part in held(model) if isinstance(part, mi.Scene))
+    state = held(model)
+    shapes = sum(len(part.shapes()) for part in state if isinstance(part, mi.Scene))
     again = not on_cuda() and shapes <= SHAPES
 
     def evaluated(receivers: Receivers) -> Factor:
         dr.make_opaque(*receivers)  # a literal would need a recording of its own
         with _no_garbage_collected():
-            m = Factor(*recording.ask(model, receivers, again))
+            m = Factor(*recording.ask(model, state, receivers, again))
         dr.eval(*m)
         return m
 
@@ -69,7 +71,7 @@ def _no_garbage_collected() -> Iterator[None]:
             gc.enable()
 
 
-def held(evaluate: Any) -> tuple[Any, ...]:
+def held(evaluate: Evaluate) -> tuple[Any, ...]:
     """The arrays and scenes that a model's data and functions hold, however deep."""
     found: list[Any] = []
     seen: set[int] = set()
