@@ -16,7 +16,7 @@ from scipy.interpolate import RegularGridInterpolator
 
 import grimaldi
 from grimaldi.bench import scenes
-from grimaldi.diffraction import bundles, waves
+from grimaldi.diffraction import bundles, fine, waves
 from grimaldi.diffraction.arrays import types
 from grimaldi.diffraction.boundary import boundary
 from grimaldi.diffraction.frame import Frame
@@ -170,6 +170,20 @@ def test_fringes_that_lists_leave_out_are_too_fine_for_pixels():
     at_points, of_means = np.sqrt((abs(off) ** 2).mean()), np.sqrt((abs(off.mean(axis=1)) ** 2).mean())
     assert at_points > 0.2 * tolerance
     assert of_means < 0.25 * at_points
+
+
+def test_places_between_corners_of_flat_blocks_are_where_the_film_sees_them():
+    """A quadratic through corners on a slanted plane errs far less than a pixel."""
+    floor = Floor(2e-2, "none")
+    blocks = floor.film.blocks
+    flat = np.flatnonzero((blocks.bend.numpy()[:16] == 0) & blocks.active.numpy()[:16])  # the first of each square
+    found = np.array(fine.between(blocks)).T.reshape(-1, fine.FINE, fine.FINE, 3)[flat]
+    y, x = (np.add.outer(16.0 * of, np.arange(0, 17, 2)) for of in (flat // 4, flat % 4))
+    x, y = np.broadcast_to(x[:, None], found.shape[:3]), np.broadcast_to(y[:, :, None], found.shape[:3])
+    seen = floor.sight(*(mi.Float(v.ravel().astype(np.float32)) for v in (x, y))).receivers
+    off = np.linalg.norm(np.array(seen.p).T.reshape(found.shape) - found, axis=-1)
+    assert len(flat) > 8
+    assert np.quantile(off / np.linalg.norm(found[:, :1, 1:2] - found[:, :1, :1], axis=-1), 0.9) < 1e-3
 
 
 @pytest.mark.parametrize("across", [2, INNER])

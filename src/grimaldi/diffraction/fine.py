@@ -28,7 +28,7 @@ class Fine(NamedTuple):
     @staticmethod
     def of(search: Search, blocks: Blocks) -> Fine:
         """Those of blocks."""
-        p = _between(blocks)
+        p = between(blocks)
         frames = frame(search.source, p, search.tab)
         dr.eval(p, *frames[:5])
         return Fine(p, frames)
@@ -45,8 +45,8 @@ def corner(block: Any, i: Any) -> Any:
     return place(block, 2 * row, 2 * (i - row * LATTICE))
 
 
-def _between(blocks: Blocks) -> Any:
-    """The film sees planes at a slant: a quadratic tells places between corners by the three about them."""
+def between(blocks: Blocks) -> Any:
+    """Their points. The film sees planes at a slant: between corners, a quadratic tells them by the three about."""
     index = dr.arange(mi.UInt32, FINE * FINE * dr.width(blocks.p))
     block = index // (FINE * FINE)
     row = (index - block * (FINE * FINE)) // FINE

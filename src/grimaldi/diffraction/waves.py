@@ -9,7 +9,7 @@ import mitsuba
 import numpy as np
 
 from grimaldi.diffraction.bundles import bundled
-from grimaldi.diffraction.chirps import FARTHEST, PLACES, QUADRANTS, Chirps, Samples, fit, place_of, sampled
+from grimaldi.diffraction.chirps import FARTHEST, PLACES, QUADRANTS, Chirps, Fit, Samples, fit, place_of, sampled
 from grimaldi.diffraction.frame import Frame
 from grimaldi.diffraction.hierarchy import NONE
 from grimaldi.diffraction.lists import List, places
@@ -77,21 +77,34 @@ def waves(
     inside = dr.zeros(mi.Bool, len(wanted))
     dr.scatter(inside, mi.Bool(True), pair, fits & (chirp == NONE))
 
-    # in quadrants, what is none over the whole block
-    entry = places(flat & told & ~fits)
-    of = dr.arange(mi.UInt32, QUADRANTS * len(entry)) % QUADRANTS
-    entry = dr.gather(mi.UInt32, entry, dr.arange(mi.UInt32, QUADRANTS * len(entry)) // QUADRANTS)
-    block, piece = (dr.gather(mi.UInt32, v, entry) for v in (block, piece))
-    parts = fit(_samples(search, at_places, block, piece, of), len(entry), search.tab.types, of)
-    fits = dr.gather(mi.Bool, flat & told & ~fits, entry)
-    fits &= parts.ray2 > dr.square(0.5 * AWAY * dr.gather(mi.Float, radius, entry))
-    fits &= (parts.off2 < dr.gather(mi.Float, allowed, entry)) & (parts.beats < BEATS)
-    own = dr.gather(mi.UInt32, pair, entry)
-    dr.scatter(index, dr.width(off2) + dr.arange(mi.UInt32, len(entry)), QUADRANTS * own + of, fits)
+    rest = places(flat & told & ~fits)
+    least = 0.5 * AWAY * radius
+    of_rest = (dr.gather(type(v), v, rest) for v in (block, piece, least, allowed))
+    parts, entry, of, serves = _in_quadrants(search, at_places, *of_rest)
+    entry = dr.gather(mi.UInt32, rest, entry)
+    serves &= dr.gather(mi.Bool, flat & told & ~fits, entry)
+    own = QUADRANTS * dr.gather(mi.UInt32, pair, entry) + of
+    dr.scatter(index, dr.width(off2) + dr.arange(mi.UInt32, len(entry)), own, serves)
     off2 = mi.Float(dr.concat((off2, parts.off2)))
     chirps = chirps.and_those_of(parts.chirps)
     dr.eval(index, inside, chirps.packets, off2)
     return Waves(chirps, index, off2, inside, small, SMALL * search.tolerance * left, *near)
+
+
+def _in_quadrants(
+    search: Search, frames: Frame, block: Any, piece: Any, least: Any, allowed: Any
+) -> tuple[Fit, Any, Any, Any]:
+    """Chirps in all quadrants of blocks: of which of these, in which quadrant, and whether they serve.
+
+    least: how far rays pass by the piece; allowed: off2.
+    """
+    index = dr.arange(mi.UInt32, QUADRANTS * len(block))
+    entry, of = index // QUADRANTS, index % QUADRANTS
+    block, piece = (dr.gather(mi.UInt32, v, entry) for v in (block, piece))
+    found = fit(_samples(search, frames, block, piece, of), len(index), search.tab.types, of)
+    serves = found.ray2 > dr.square(dr.gather(mi.Float, least, entry))
+    serves &= (found.off2 < dr.gather(mi.Float, allowed, entry)) & (found.beats < BEATS)
+    return found, entry, of, serves
 
 
 def _of_curved(size: Any, search: Search, blocks: Blocks, frames: Frame, pairs: Pairs, wanted: Any) -> None:

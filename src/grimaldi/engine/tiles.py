@@ -27,7 +27,7 @@ from grimaldi.tracing import trace
 mi: Any = mitsuba  # the stubs refuse numbers where arrays are asked for
 
 ASKED = 1 << 19  # rays of a tile at whose ends the model is asked for M: a few seconds of work
-RAYS = 1 << 21  # of a tile in all: some hundred bytes each
+RAYS = 1 << 22  # of a tile in all: some hundred bytes each
 PAIRS = 1 << 27  # of blocks of a band and what is looked at for them
 NODES = 1 << 23  # of the cells of a band of the film: some twenty bytes each
 
