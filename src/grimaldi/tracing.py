@@ -45,7 +45,8 @@ def trace(
     ordinary = ordinary_emitters(scene)
     limit = 0xFFFFFFFF if max_depth < 0 else max_depth
     goes_further = len(ordinary) > 0 or limit > 2  # sources of waves have no surface that a ray might meet
-    mode = "evaluated" if on_cuda() else None  # a loop that is recorded cannot end kernels
+    once = limit == 2 and not goes_further  # kernels are quicker without a loop
+    mode = "scalar" if once else "evaluated" if on_cuda() else None  # a loop that is recorded cannot end kernels
 
     # --------------------- Loop state ----------------------
     ray = mi.Ray3f(ray)
@@ -61,7 +62,8 @@ def trace(
     pdf_prev = mi.Float(1)
     delta_prev = mi.Bool(True)
 
-    while dr.hint(active, mode=mode):
+    again = True if once else active
+    while dr.hint(again, mode=mode):
         si = scene.ray_intersect(ray, mi.RayFlags.All, depth == 0, active)
         end_kernel(si)
         bsdf = si.bsdf(ray)
@@ -118,6 +120,7 @@ def trace(
             active &= ~roulette | (sampler.next_1d(active) < survival)
             beta[roulette] *= dr.rcp(survival)
         depth += 1
+        again = False if once else active
 
     return Path(L, valid, seen, real, imag, error)
 
