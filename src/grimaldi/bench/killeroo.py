@@ -58,7 +58,8 @@ def compare(path: Path, film: Film, runs: int) -> Result:
         ]
     text = (
         f"`killeroo.xml` at {film}, loaded, warm: `grimaldi.render` and `mi.render` with the scene's own `direct`, in "
-        f"turn. Outlines are kept with the loaded scene, as its tree of triangles is; the first picture finds them. A "
-        f"picture is timed once where all runs would take more than {LONG:g} s. {HOW}"
+        f"turn. Outlines and Dr.Jit's recordings are kept with the loaded scene, as its tree of triangles is; the "
+        f"first picture in its light makes them. A picture is timed once where all runs would take more than "
+        f"{LONG:g} s. {HOW}"
     )
     return Result(text, tuple(lines), tuple(targets))
