@@ -19,8 +19,9 @@ from grimaldi.bench import scenes
 from grimaldi.diffraction import bundles, fine, waves
 from grimaldi.diffraction.arrays import types
 from grimaldi.diffraction.boundary import boundary
+from grimaldi.diffraction.chirps import FARTHEST, PLACES, Samples, fit
 from grimaldi.diffraction.frame import Frame
-from grimaldi.diffraction.hierarchy import layout, least_detour
+from grimaldi.diffraction.hierarchy import NONE, layout, least_detour
 from grimaldi.diffraction.lists import FINELY, INNER, List, Parts, listed_sum
 from grimaldi.diffraction.model import OUTSIDE, Evaluate, Factor, Options, Receivers
 from grimaldi.diffraction.reach import reach
@@ -201,38 +202,53 @@ def test_what_reaches_a_cell_in_part_grows_evenly_between_places(across):
     np.testing.assert_allclose(parts.share(index, receivers).numpy(), expected, atol=1e-5)
 
 
-def test_chirps_tell_what_the_segments_of_pieces_do(monkeypatch):
-    """Nearly all that reaches blocks as a whole; together they err by 0.05 of the tolerance in the mean, or bundled."""
-    tolerance = 5e-2
-    monkeypatch.setattr(scenes, "WAVELENGTH", 2.0)  # fringes wider than blocks
+def with_and_without(
+    monkeypatch: Any, module: Any, name: str, value: float, tolerance: float
+) -> tuple[Any, Any, Reals]:
+    """Lists under fringes wider than blocks, those with a number of a module set anew, and how far their M differs."""
+    monkeypatch.setattr(scenes, "WAVELENGTH", 2.0)
     floor = Floor(tolerance, "none")
     factor: Any = floor.light.beams[0].factor
     places = np.random.default_rng(1).uniform(0, 64, (2, 2000))
-    by_chirps, _ = floor.both(floor.film, *places)
-    lists = factor.single.lists(floor.film.blocks)
-    assert lists.everywhere.begin.numpy()[-1] > 10 * lists.runs.first.begin.numpy()[-1] > 0
-    monkeypatch.setattr(waves, "FITS", 0.0)
-    by_segments, _ = floor.both(floor.film, *places)
-    assert factor.single.lists(floor.film.blocks).everywhere.begin.numpy()[-1] == 0
-    off = abs(by_chirps - by_segments)
+    told, lists = [], []
+    for _ in range(2):
+        told.append(floor.both(floor.film, *places)[0])
+        lists.append(factor.single.lists(floor.film.blocks))
+        monkeypatch.setattr(module, name, value)
+    return lists[0], lists[1], abs(told[0] - told[1])
+
+
+def test_chirps_tell_what_the_segments_of_pieces_do(monkeypatch):
+    """Nearly all that reaches blocks as a whole; together they err by 0.05 of the tolerance in the mean, or bundled."""
+    tolerance = 5e-2
+    chirps, segments, off = with_and_without(monkeypatch, waves, "FITS", 0.0, tolerance)
+    assert chirps.everywhere.begin.numpy()[-1] > 10 * chirps.runs.first.begin.numpy()[-1] > 0
+    assert segments.everywhere.begin.numpy()[-1] == 0
     assert 0 < off.max() < 0.3 * tolerance
     assert np.sqrt((off**2).mean()) < 0.1 * tolerance
 
 
 def test_bundles_are_fewer_chirps_that_tell_the_same(monkeypatch):
     tolerance = 5e-2
-    monkeypatch.setattr(scenes, "WAVELENGTH", 2.0)
-    floor = Floor(tolerance, "none")
-    factor: Any = floor.light.beams[0].factor
-    places = np.random.default_rng(1).uniform(0, 64, (2, 2000))
-    by_bundles, _ = floor.both(floor.film, *places)
-    fewer = factor.single.lists(floor.film.blocks).everywhere
-    monkeypatch.setattr(bundles, "ROUNDS", 0)
-    by_each, _ = floor.both(floor.film, *places)
-    every = factor.single.lists(floor.film.blocks).everywhere
-    assert fewer.begin.numpy()[-1] < 0.8 * every.begin.numpy()[-1]
-    off = abs(by_bundles - by_each)
+    fewer, every, off = with_and_without(monkeypatch, bundles, "ROUNDS", 0, tolerance)
+    assert fewer.everywhere.begin.numpy()[-1] < 0.8 * every.everywhere.begin.numpy()[-1]
     assert 0 < np.sqrt((off**2).mean()) < 0.05 * tolerance
+
+
+@pytest.mark.parametrize("blocks", [[0], [0, 1, 2], [0, 0], [0, 0, 0]])
+def test_a_bundle_holds_each_of_its_waves_once(blocks):
+    """Waves of 1/4 everywhere: those of a block add up, whether one, or several, or none are left to go with it."""
+    n, single = len(blocks), types(double=False)
+    samples = Samples(*(dr.full(single.Float, value, PLACES * n) for value in (0.25, 0, 0, 0, FARTHEST, FARTHEST)))
+    block = mi.UInt32(blocks)
+    allowed = dr.full(single.Float, 1.0, n)
+    found = fit(samples, n, single)
+    chirps, _, chirp = bundles.bundled(found, samples, dr.arange(mi.UInt32, n), block, allowed, max(blocks) + 1)
+    own: Any = dr.compress(chirp != NONE)
+    real, imag = chirps.at(dr.gather(mi.UInt32, chirp, own), mi.Float(0.3), mi.Float(-0.2))
+    np.testing.assert_array_equal(dr.gather(mi.UInt32, block, own).numpy(), np.unique(blocks))
+    np.testing.assert_allclose(real.numpy(), 0.25 * np.bincount(blocks), rtol=1e-5)
+    np.testing.assert_allclose(imag.numpy(), 0, atol=1e-6)
 
 
 def test_lists_are_the_same_in_both_precisions():
@@ -248,18 +264,10 @@ def test_lists_are_the_same_in_both_precisions():
 
 def test_waves_are_left_out_as_long_as_all_of_them_make_little(monkeypatch):
     tolerance = 5e-2
-    monkeypatch.setattr(scenes, "WAVELENGTH", 2.0)
-    floor = Floor(tolerance, "none")
-    factor: Any = floor.light.beams[0].factor
-    places = np.random.default_rng(1).uniform(0, 64, (2, 2000))
-    by_many, _ = floor.both(floor.film, *places)
-    many, left = (getattr(factor.single.lists(floor.film.blocks), name) for name in ("everywhere", "left"))
-    monkeypatch.setattr(waves, "SMALL", 1e-9)
-    by_all, _ = floor.both(floor.film, *places)
-    every = factor.single.lists(floor.film.blocks)
-    assert many.begin.numpy()[-1] < every.everywhere.begin.numpy()[-1]
-    assert 0 < abs(by_many - by_all).max() < 2 * 0.05 * tolerance
-    assert 0 < (left.numpy() - every.left.numpy()).max() <= 0.05 * tolerance
+    many, every, off = with_and_without(monkeypatch, waves, "SMALL", 1e-9, tolerance)
+    assert many.everywhere.begin.numpy()[-1] < every.everywhere.begin.numpy()[-1]
+    assert 0 < off.max() < 2 * 0.05 * tolerance
+    assert 0 < (many.left.numpy() - every.left.numpy()).max() <= 0.05 * tolerance
 
 
 def test_a_square_has_a_block_for_each_of_three_surfaces():

@@ -12,14 +12,12 @@ import mitsuba
 
 from grimaldi.diffraction.chirps import FARTHEST, PLACES, Chirps, Fit, Samples, fit
 from grimaldi.diffraction.hierarchy import NONE
-from grimaldi.diffraction.lists import List, places
+from grimaldi.diffraction.lists import List
 
 mi: Any = mitsuba  # the stubs refuse numbers where arrays are asked for
 
 ROUNDS = 4
-APART = (
-    0.25  # turns, that two waves may run against each other over a block: no quadratic tells what more makes of them
-)
+APART = 0.25  # turns, that two waves may run against each other over a block: no quadratic tells what more makes
 
 
 def bundled(found: Fit, samples: Samples, wave: Any, block: Any, allowed: Any, number: int) -> tuple[Chirps, Any, Any]:
@@ -35,16 +33,15 @@ def bundled(found: Fit, samples: Samples, wave: Any, block: Any, allowed: Any, n
     dr.eval(own, chirp, size2, values)
     for turn in range(ROUNDS):
         first = _firsts(block, number, turn % 2)
+        if len(first) == 0:
+            continue
         joint = _joint(values, size2, first)
         both = fit(joint, len(first), types)
         ok = (both.off2 < dr.gather(type(allowed), allowed, first)) & (both.beats < APART)
-        ok &= dr.gather(mi.UInt32, block, first) == dr.gather(mi.UInt32, block, dr.minimum(first + 1, len(block) - 1))
         index = sum(len(part) for part in off2) + dr.arange(mi.UInt32, len(first))
         dr.eval(ok, index)
 
-        place = dr.arange(mi.UInt32, PLACES * len(first))
-        of = place // PLACES
-        at = PLACES * dr.gather(mi.UInt32, first, of) + place - PLACES * of
+        at, of = _places_of(first)
         for value, new in zip(values, joint[:3], strict=True):
             dr.scatter(value, new, at, dr.gather(mi.Bool, ok, of))
         dr.scatter(size2, both.size2, first, ok)
@@ -55,7 +52,7 @@ def bundled(found: Fit, samples: Samples, wave: Any, block: Any, allowed: Any, n
 
         alone = dr.full(mi.Bool, True, len(block))
         dr.scatter(alone, mi.Bool(False), first + 1, ok)
-        left = places(alone)
+        left: Any = dr.compress(alone)
         wave, block, chirp = (dr.gather(mi.UInt32, v, left) for v in (wave, block, chirp))
         size2, allowed = (dr.gather(type(v), v, left) for v in (size2, allowed))
         values = [_of(v, left) for v in values]
@@ -69,21 +66,25 @@ def _firsts(block: Any, number: int, begin: int) -> Any:
     index = dr.arange(mi.UInt32, len(block))
     of = List.of(dr.full(mi.Bool, True, len(block)), block, number, index)
     rank = index - dr.gather(mi.UInt32, of.begin, block)
-    return places((rank % 2 == begin) & (index + 1 < dr.gather(mi.UInt32, of.begin, block + 1)))
+    return dr.compress((rank % 2 == begin) & (index + 1 < dr.gather(mi.UInt32, of.begin, block + 1)))
+
+
+def _places_of(some: Any) -> tuple[Any, Any]:
+    """Where what some have at their PLACES stands among that of all; and whose each is."""
+    index = dr.arange(mi.UInt32, PLACES * len(some))
+    of = index // PLACES
+    return PLACES * dr.gather(mi.UInt32, some, of) + index - PLACES * of, of
 
 
 def _of(values: Any, some: Any) -> Any:
     """What some have at their PLACES."""
-    index = dr.arange(mi.UInt32, PLACES * len(some))
-    of = index // PLACES
-    return dr.gather(type(values), values, PLACES * dr.gather(mi.UInt32, some, of) + index - PLACES * of)
+    return dr.gather(type(values), values, _places_of(some)[0])
 
 
 def _joint(values: list[Any], size2: Any, first: Any) -> Samples:
     """What the first ones and the next send together; `spread`: by how many turns these run against each other."""
-    last = dr.width(size2) - 1
-    a, b = first, dr.minimum(first + 1, last)
-    of = dr.arange(mi.UInt32, PLACES * len(first)) // PLACES
+    a, b = first, first + 1
+    _, of = _places_of(first)
     share = dr.gather(type(size2), size2, a) / (dr.gather(type(size2), size2, a) + dr.gather(type(size2), size2, b))
     (re, im, turns), (re2, im2, turns2) = ([_of(v, i) for v in values] for i in (a, b))
     joint = re + re2, im + im2, dr.lerp(turns2, turns, dr.gather(type(share), share, of)), turns2 - turns
