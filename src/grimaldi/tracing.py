@@ -45,8 +45,8 @@ def trace(
     ordinary = ordinary_emitters(scene)
     limit = 0xFFFFFFFF if max_depth < 0 else max_depth
     goes_further = len(ordinary) > 0 or limit > 2  # sources of waves have no surface that a ray might meet
-    once = limit == 2 and not goes_further  # kernels are quicker without a loop
-    mode = "scalar" if once else "evaluated" if on_cuda() else None  # a loop that is recorded cannot end kernels
+    # kernels are quicker without a loop; one that is recorded cannot end them
+    mode = "scalar" if not goes_further else "evaluated" if on_cuda() else None
 
     # --------------------- Loop state ----------------------
     ray = mi.Ray3f(ray)
@@ -62,7 +62,7 @@ def trace(
     pdf_prev = mi.Float(1)
     delta_prev = mi.Bool(True)
 
-    again = True if once else active
+    again = active if goes_further else True
     while dr.hint(again, mode=mode):
         si = scene.ray_intersect(ray, mi.RayFlags.All, depth == 0, active)
         end_kernel(si)
@@ -120,7 +120,7 @@ def trace(
             active &= ~roulette | (sampler.next_1d(active) < survival)
             beta[roulette] *= dr.rcp(survival)
         depth += 1
-        again = False if once else active
+        again = active if goes_further else False
 
     return Path(L, valid, seen, real, imag, error)
 

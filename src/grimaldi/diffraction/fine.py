@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import drjit as dr
 import mitsuba
 
-from grimaldi.diffraction.frame import Frame, frame
+from grimaldi.diffraction.frame import Frame
 from grimaldi.diffraction.model import ACROSS, LATTICE, Blocks
 from grimaldi.diffraction.search import Search
 
@@ -23,15 +23,14 @@ class Fine(NamedTuple):
     """
 
     p: Any  # Float64 (3)
-    frames: Frame  # evaluated: once for each point, not once for each pair
+    frames: Frame
 
     @staticmethod
     def of(search: Search, blocks: Blocks) -> Fine:
         """Those of blocks."""
         p = between(blocks)
-        frames = frame(search.source, p, search.tab)
-        dr.eval(p, *frames[:5])
-        return Fine(p, frames)
+        dr.schedule(p)  # in the same kernel
+        return Fine(p, search.frames(p))
 
 
 def place(block: Any, row: Any, column: Any) -> Any:

@@ -17,7 +17,7 @@ from grimaldi.diffraction.chirps import QUADRANTS, quadrant
 from grimaldi.diffraction.corners import Corner, corner, slopes
 from grimaldi.diffraction.edges import cut_off, sounds
 from grimaldi.diffraction.fine import Fine
-from grimaldi.diffraction.frame import Frame, constant, frame
+from grimaldi.diffraction.frame import Frame, constant
 from grimaldi.diffraction.grazing import Near, near, other_than, worth
 from grimaldi.diffraction.hierarchy import NONE, least_detour
 from grimaldi.diffraction.lists import List, Lists, Parts, Runs, places
@@ -55,7 +55,7 @@ def lists(search: Search, blocks: Blocks) -> Lists:
     """What acts on each block."""
     tab, tolerance = search.tab, search.tolerance
     n, number = int(tab.n_pieces[0]), dr.width(blocks.p)
-    frames = _frames(search, blocks.p)
+    frames = search.frames(blocks.p)
     pairs = _pairs(search, blocks, frames, n)
     beside = _beside(search, blocks, frames)
     seen = _look(search, blocks, frames, pairs, beside)
@@ -204,13 +204,6 @@ def _in_cells(
         parts(reaches & ~told, own),
         parts(reaches & told, chirp),
     )
-
-
-def _frames(search: Search, p: Any) -> Frame:
-    """Evaluated: once for each point, not once for each pair."""
-    frames = frame(search.source, p, search.tab)
-    dr.eval(*frames[:5])
-    return frames
 
 
 def _pairs(search: Search, blocks: Blocks, frames: Frame, n: int) -> Pairs:

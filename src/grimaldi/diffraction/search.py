@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+import drjit as dr
+
+from grimaldi.diffraction.frame import Frame, frame
 from grimaldi.diffraction.grazing import Chords
 from grimaldi.diffraction.occlusion import Rays
 from grimaldi.diffraction.segment import Rule
@@ -26,6 +29,12 @@ class Search(NamedTuple):
     share: float
     probe: Rays | None
     grazing: Chords | None
+
+    def frames(self, p: Any) -> Frame:
+        """Of points (Float64), evaluated: once for each, not once for each piece."""
+        frames = frame(self.source, p, self.tab)
+        dr.eval(*frames[:5])
+        return frames
 
 
 class Pairs(NamedTuple):
