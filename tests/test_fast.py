@@ -19,7 +19,7 @@ from grimaldi.bench import scenes
 from grimaldi.diffraction import bundles, fine, waves
 from grimaldi.diffraction.arrays import types
 from grimaldi.diffraction.boundary import boundary
-from grimaldi.diffraction.chirps import FARTHEST, PLACES, Samples, fit
+from grimaldi.diffraction.chirps import BETWEEN, FARTHEST, GRID, PLACES, Samples, fit
 from grimaldi.diffraction.frame import Frame
 from grimaldi.diffraction.hierarchy import NONE, layout, least_detour
 from grimaldi.diffraction.lists import FINELY, INNER, List, Parts, listed_sum
@@ -226,6 +226,22 @@ def test_chirps_tell_what_the_segments_of_pieces_do(monkeypatch):
     assert segments.everywhere.begin.numpy()[-1] == 0
     assert 0 < off.max() < 0.3 * tolerance
     assert np.sqrt((off**2).mean()) < 0.1 * tolerance
+
+
+def test_a_chirp_whose_amplitude_goes_through_zero_is_told():
+    """A e^{iψ} with A and ψ quadratic in the place, by its values at PLACES and ψ there, but for less than a quarter of a turn."""
+
+    def wave(u: Any, v: Any) -> Any:
+        return (0.4 - u + 0.2 * u * v) * np.exp(2j * np.pi * (0.3 + 2.1 * u - 1.3 * v + 0.11 * u * u - 0.06 * v * v))
+
+    place = np.array([*GRID, *BETWEEN]).T
+    single, one = types(double=False), np.ones(PLACES)
+    values = wave(*place).real, wave(*place).imag, 2.05 * place[0] - 1.25 * place[1], one, one, one
+    found = fit(Samples(*(single.Float(v) for v in values)), 1, single)
+    u, v = np.random.default_rng(2).uniform(-1, 1, (2, 200))
+    real, imag = found.chirps.at(dr.zeros(mi.UInt32, 200), mi.Float(u), mi.Float(v))
+    np.testing.assert_allclose(real.numpy() + 1j * imag.numpy(), wave(u, v), atol=1e-5)
+    assert np.sqrt(found.off2.numpy()[0]) < 1e-5
 
 
 def test_bundles_are_fewer_chirps_that_tell_the_same(monkeypatch):

@@ -1,5 +1,4 @@
-"""Waves over a flat block of receivers as chirps: what a piece sends there is e^{iψ}, ψ quadratic in the place, times
-an amplitude that is quadratic too.
+"""Waves over a flat block of receivers as chirps: what a piece sends there is A e^{iψ}, A and ψ quadratic in the place.
 
 k(r + s - R) bends by little over the few pixels of a block, and what a short piece sends besides changes slowly. So a
 wave is asked for at nine places of a block, and told anywhere in it for a sine and a cosine; where these and four
@@ -8,7 +7,7 @@ places between are not told closely enough it is no chirp there, but may be in a
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import drjit as dr
@@ -32,15 +31,14 @@ GRID = [(u, v) for v in (-1.0, 0.0, 1.0) for u in (-1.0, 0.0, 1.0)]
 BETWEEN = [(u, v) for v in (-0.5, 0.5) for u in (-0.5, 0.5)]  # and by which that is tried
 PLACES = len(GRID) + len(BETWEEN)
 QUADRANTS = 4
-PACKETS = 5
+PACKETS = 3
 FARTHEST = 1e30  # square of distances, for no distance
 
 
 class Chirps(NamedTuple):
     """Waves over blocks: real and imaginary part at places u, v of those, -1..1 along the film's rows and columns.
 
-    Five packets for each: of ψ/2π the terms in u, v, u², uv, v², then those of the amplitude, real and imaginary, in
-    1, u, v, u², uv, v².
+    Three packets for each: the terms of ψ/2π in 1, u, v, u², uv, v², then those of A.
     """
 
     packets: Any
@@ -52,11 +50,10 @@ class Chirps(NamedTuple):
 
     def at(self, i: Any, u: Any, v: Any) -> tuple[Any, Any]:
         """The wave i."""
-        a, b, c, d, e = (dr.gather(self.types.Packet, self.packets, PACKETS * i + j) for j in range(PACKETS))
-        sin, cos = of_turns(_quadratic((0, a.x, a.y, a.z, a.w, b.x), u, v))
-        real = _quadratic((b.y, b.w, c.y, c.w, d.y, d.w), u, v)
-        imag = _quadratic((b.z, c.x, c.z, d.x, d.z, e.x), u, v)
-        return real * cos - imag * sin, real * sin + imag * cos
+        a, b, c = (dr.gather(self.types.Packet, self.packets, PACKETS * i + j) for j in range(PACKETS))
+        sin, cos = of_turns(_quadratic((*a, b.x, b.y), u, v))
+        amplitude = _quadratic((b.z, b.w, *c), u, v)
+        return amplitude * cos, amplitude * sin
 
 
 def _quadratic(terms: tuple[Any, ...], u: Any, v: Any) -> Any:
@@ -133,28 +130,26 @@ def fit(samples: Samples, n: int, types: Types, of: Any | None = None) -> Fit:
         return [dr.gather(F, values, PLACES * index + t) for t in range(PLACES)]
 
     turns = (F(0), *_terms(at_places(samples.turns))[1:])
-    left, right = [], []
+    left: list[tuple[Any, Any]] = []
     for (u, v), re, im in zip((*GRID, *BETWEEN), at_places(samples.real), at_places(samples.imag), strict=True):
         sin, cos = of_turns(_quadratic(turns, u, v))
-        left.append(re * cos + im * sin)
-        right.append(im * cos - re * sin)
-    real, imag = _terms(left), _terms(right)
+        left.append((re * cos + im * sin, im * cos - re * sin))
+    mean, phases, amplitudes = _polar(left)
+    phase, amplitude = _terms(phases), _terms(amplitudes)
     size2, off2 = F(0), F(0)
-    for (u, v), re, im in zip((*GRID, *BETWEEN), left, right, strict=True):
+    for (u, v), (re, im) in zip((*GRID, *BETWEEN), left, strict=True):
+        sin, cos = of_turns(mean + _quadratic(phase, u, v))
+        told = _quadratic(amplitude, u, v)
         size2 += re * re + im * im
-        off2 += dr.square(_quadratic(real, u, v) - re) + dr.square(_quadratic(imag, u, v) - im)
+        off2 += dr.square(told * cos - re) + dr.square(told * sin - im)
     low, high, ray2 = F(dr.inf), F(-dr.inf), F(FARTHEST)
     for spread, distance2 in zip(at_places(samples.spread), at_places(samples.ray2), strict=True):
         low, high, ray2 = dr.minimum(low, spread), dr.maximum(high, spread), dr.minimum(ray2, distance2)
+    psi = [a + b for a, b in zip(turns, phase, strict=True)]
+    psi[0] += mean
     if of is not None:
-        turns, real, imag = (_widened(terms, of) for terms in (turns, real, imag))
-        sin, cos = of_turns(turns[0] - dr.round(turns[0]))
-        real, imag = (
-            [re * cos - im * sin for re, im in zip(real, imag, strict=True)],
-            [re * sin + im * cos for re, im in zip(real, imag, strict=True)],
-        )
-    amplitude = [part for pair in zip(real, imag, strict=True) for part in pair]
-    numbers = [*turns[1:], *amplitude, F(0), F(0), F(0)]
+        psi, amplitude = (_widened(terms, of) for terms in (psi, amplitude))
+    numbers = [psi[0] - dr.round(psi[0]), *psi[1:], *amplitude]
     packets = dr.zeros(F, 4 * PACKETS * n)
     for j in range(PACKETS):
         dr.scatter(packets, types.Packet(*numbers[4 * j : 4 * j + 4]), PACKETS * index + j)
@@ -163,7 +158,24 @@ def fit(samples: Samples, n: int, types: Types, of: Any | None = None) -> Fit:
     return Fit(Chirps(packets, types), *found)
 
 
-def _widened(terms: tuple[Any, ...], of: Any) -> tuple[Any, ...]:
+def _polar(values: list[tuple[Any, Any]]) -> tuple[Any, list[Any], list[Any]]:
+    """Of complex numbers their mean phase, what theirs differ from it by, in turns, and amplitudes.
+
+    Where that is more than a quarter the amplitude has the other sign instead: so it may go through zero.
+    """
+    real: Any = sum(re for re, _ in values)
+    imag: Any = sum(im for _, im in values)
+    inv = dr.rsqrt(dr.maximum(dr.fma(real, real, imag * imag), 1e-30))
+    cos, sin = real * inv, imag * inv
+    phases, amplitudes = [], []
+    for re, im in values:
+        along, across = re * cos + im * sin, im * cos - re * sin
+        phases.append(dr.atan(across / dr.select(along == 0, 1, along)) / (2 * np.pi))
+        amplitudes.append(dr.mulsign(dr.sqrt(dr.fma(re, re, im * im)), along))
+    return dr.atan2(imag, real) / (2 * np.pi), phases, amplitudes
+
+
+def _widened(terms: Sequence[Any], of: Any) -> tuple[Any, ...]:
     """The same quadratic at places of blocks, by its terms at places of some quadrants: u of these is 2u ± 1."""
     one, of_u, of_v, of_uu, of_uv, of_vv = terms
     s, t = (dr.select(side > 0, type(one)(1), -1) for side in (of & 1, of >> 1))
