@@ -229,7 +229,7 @@ def test_chirps_tell_what_the_segments_of_pieces_do(monkeypatch):
 
 
 def test_a_chirp_whose_amplitude_goes_through_zero_is_told():
-    """A e^{iψ} with A and ψ quadratic in the place, by its values at PLACES and ψ there, but for less than a quarter of a turn."""
+    """A e^{iψ} with A and ψ quadratic in the place, its values and ψ at PLACES, but for a part of a turn."""
 
     def wave(u: Any, v: Any) -> Any:
         return (0.4 - u + 0.2 * u * v) * np.exp(2j * np.pi * (0.3 + 2.1 * u - 1.3 * v + 0.11 * u * u - 0.06 * v * v))
