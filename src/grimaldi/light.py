@@ -31,9 +31,9 @@ from grimaldi.propagate import Wave, carrier, factor
 from grimaldi.scene.bodies import indices, vertices
 from grimaldi.scene.model import Mesh, Scene, Source
 
-INTERPOLATED = 0.1, 5e-4, 0.035  # of a strict tolerance, at most; then of a loose one (`_shares`)
+INTERPOLATED = 0.1, 5e-4, 0.037  # of a strict tolerance, at most; then of a loose one (`_shares`)
 MOST = 0.5  # of the tolerance, to interpolation
-RAYS = 0.12  # of the tolerance: |M - M of a ray|, where pictures show a ray's
+RAYS = 0.08, 0.012  # of the tolerance, and at most: |M - M of a ray|, where pictures show a ray's
 
 
 @dataclass(frozen=True)
@@ -190,7 +190,8 @@ def _shares(beams: Sequence[Beam], beam: Beam, tolerance: float) -> Shares:
     strict, most, loose = INTERPOLATED
     alone = sum(other.key == beam.key for other in beams) == 1
     missed = max(min(strict * tolerance, most), loose * tolerance)
-    return Shares(missed, MOST * tolerance, RAYS * tolerance, 0.0 if alone else 1.0)
+    rays = min(RAYS[0] * tolerance, RAYS[1])
+    return Shares(missed, MOST * tolerance, rays, 0.0 if alone else 1.0)
 
 
 class LightOf:

@@ -31,7 +31,7 @@ mi: Any = mitsuba  # the stubs refuse numbers where arrays are asked for
 
 FINEST = 1.0  # cycles a pixel of fringes, from which on a picture's mean over pixels does without them,
 AVERAGED = 0.05  # at this tolerance and above; below, more in proportion
-CORNER = 0.007  # of the tolerance: |M| of a corner that is left out
+CORNER = 0.0035  # of the tolerance: |M| of a corner that is left out
 SQUARES = 1 << 16  # parts of its square, in which it is counted: sums of whole numbers are the same in any order
 WEAK = 0.3  # of the tolerance: |M| of an end that grows evenly between corners of cells which it reaches or not
 REMOTE = 1.5  # radii of a block, that such a piece is away from it at least

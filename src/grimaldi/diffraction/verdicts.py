@@ -17,7 +17,7 @@ from grimaldi.diffraction.search import Pairs, Search
 
 mi: Any = mitsuba  # the stubs refuse numbers where arrays are asked for
 
-FAINT = 0.2  # of the tolerance: |M| at all four corners of a cell of an end that grows evenly between them
+FAINT = 0.1  # of the tolerance: |M| at all four corners of a cell of an end that grows evenly between them
 STRONG = 0.5  # and of one that grows so between INNER × INNER places of it, or corners on a curved block
 ALL = (1 << ACROSS * ACROSS) - 1  # cells
 EVERY = (1 << LATTICE * LATTICE) - 1  # corners

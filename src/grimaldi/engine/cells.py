@@ -122,6 +122,7 @@ def cells(evaluate: Evaluate, width: int, top: int, rows: int, finest: int, shar
     node_rows = 2 * down * LARGEST // finest + 1
     nodes = Values.empty(columns * node_rows)
     order = grid.square_by_square(node_rows)
+    dr.eval(order)
     index = dr.arange(mi.UInt32, across * down)
     x, y = (index % across) * LARGEST, (index // across) * LARGEST
     levels: list[_Level] = []

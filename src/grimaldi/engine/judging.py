@@ -21,8 +21,9 @@ AT_BEST = 1 / 16  # what it leaves of it at best: an eighth of a cubic's, less i
 STRAIGHT = 0.5  # what a quadratic leaves of a bilinear function's error, at most
 SIMPSON = 1 / 6, 4 / 6, 1 / 6  # means of quadratics
 OF_PIXEL = 1  # times its share, that the mean over a pixel may be off by, where that is a cell
-BY_CUBICS = 1.75, 1  # times its share, that cubics and quadratics may be apart in a pixel, and in a larger cell
-IN_PIXEL = 3  # times its share, that M may be off by within a pixel
+IN_PIXEL = 3  # times its share, that M may be off by within a pixel, and in larger cells less by their size: so they
+# add the same to a picture's mean square, and a node pays as much in one as in another
+BY_CUBICS = 1.75  # likewise, that cubics and quadratics may be apart in any cell at most
 FAINT = 1.5  # times what |M - M of a ray| may be at nodes, that it may be at one more place
 WITNESS = 0.31, 0.64  # where in a cell M is asked for once more: fringes as wide as nodes are apart look like none
 WIDE = 0.1  # |M - M of a ray| at all nodes of a cell, above which fringes, and the rim among them, are wider than it
@@ -81,7 +82,7 @@ def judged(nodes: Values, grid: Grid, x: Any, y: Any, size: int, finest: int, sh
     if size == 1:
         serves &= (left_of_mean <= OF_PIXEL * missed) & (left <= IN_PIXEL * missed)
     else:
-        serves &= (left <= missed) & (resolved | (least > WIDE))
+        serves &= (left <= IN_PIXEL / size * missed) & (resolved | (least > WIDE))
     cubic, off_cubic = _by_cubics(nodes, grid, x, y, size, light, shares)
     cubic &= ~serves & (resolved | (least > WIDE))
     serves |= cubic
@@ -134,7 +135,7 @@ def _by_cubics(nodes: Values, grid: Grid, x: Any, y: Any, size: int, light: Any,
     first = grid.node(x, y, size, 0, 0) - (across + down)
     off = apart(nodes.values, nodes.shape, first, (across, down), grid.inside(x, y, size))
     missed, allowed = dr.opaque(mi.Float, shares.missed), dr.opaque(mi.Float, shares.most)
-    return (off <= allowed) & (off * (light + off) <= BY_CUBICS[size > 1] * missed), off
+    return (off <= allowed) & (off * (light + off) <= min(IN_PIXEL / size, BY_CUBICS) * missed), off
 
 
 def _waves(own: list[Any]) -> tuple[Any, Any, Any]:
