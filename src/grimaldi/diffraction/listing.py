@@ -7,20 +7,20 @@ the block is on no list: it takes no part in means over pixels.
 from __future__ import annotations
 
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
 import drjit as dr
 import mitsuba
 import numpy as np
 
 from grimaldi.diffraction.chirps import QUADRANTS, quadrant
-from grimaldi.diffraction.corners import Corner, corner, slopes
-from grimaldi.diffraction.edges import cut_off, sounds
+from grimaldi.diffraction.edges import sounds
 from grimaldi.diffraction.fine import Fine
-from grimaldi.diffraction.frame import Frame, constant
-from grimaldi.diffraction.grazing import Near, near, other_than, worth
+from grimaldi.diffraction.frame import Frame
+from grimaldi.diffraction.grazing import Near, near
 from grimaldi.diffraction.hierarchy import NONE, least_detour
 from grimaldi.diffraction.lists import List, Lists, Parts, Runs, places
+from grimaldi.diffraction.middles import CORNER, seen_from_middles
 from grimaldi.diffraction.model import ACROSS, LATTICE, Blocks, Receivers
 from grimaldi.diffraction.search import Pairs, Search
 from grimaldi.diffraction.table import Piece, Table
@@ -31,24 +31,8 @@ mi: Any = mitsuba  # the stubs refuse numbers where arrays are asked for
 
 FINEST = 1.0  # cycles a pixel of fringes, from which on a picture's mean over pixels does without them,
 AVERAGED = 0.05  # at this tolerance and above; below, more in proportion
-CORNER = 0.0035  # of the tolerance: |M| of a corner that is left out
 SQUARES = 1 << 16  # parts of its square, in which it is counted: sums of whole numbers are the same in any order
-WEAK = 0.3  # of the tolerance: |M| of an end that grows evenly between corners of cells which it reaches or not
-REMOTE = 1.5  # radii of a block, that such a piece is away from it at least
 UNTESTED = 0.1  # of the tolerance: |M| of an end that reaches a block or not as a whole, by what its middle says
-
-
-class _Seen(NamedTuple):
-    """Pieces from the middles of blocks."""
-
-    open: Any  # whether it acts there
-    idle: Any  # whether that makes no difference
-    weak: Any  # whether a chain cut off on it leaves little everywhere in the block
-    far: Any  # whether leading terms serve everywhere in the block
-    inner2: Any  # sum of squares of what its inner corners send
-    start: Any  # C φ'/ψ' at its ends
-    stop: Any
-    passes: Any  # whether the way to the block grazes another body's silhouette
 
 
 def lists(search: Search, blocks: Blocks) -> Lists:
@@ -58,7 +42,7 @@ def lists(search: Search, blocks: Blocks) -> Lists:
     frames = search.frames(blocks.p)
     pairs = _pairs(search, blocks, frames, n)
     beside = _beside(search, blocks, frames)
-    seen = _look(search, blocks, frames, pairs, beside)
+    seen = seen_from_middles(search, blocks, frames, pairs, beside)
 
     # where a piece reaches this block but not the next in the same plane, it may not reach all of it
     open_, closed = dr.zeros(mi.Bool, number * n), dr.zeros(mi.Bool, number * n)
@@ -259,87 +243,3 @@ def _beside(search: Search, blocks: Blocks, frames: Frame) -> Near | None:
     found = near(frames, search.grazing, search.k, middle, search.tab.types.Float(blocks.radius))
     dr.eval(found.body, found.v2, found.next_body, found.next_v2)
     return found
-
-
-def _look(search: Search, blocks: Blocks, frames: Frame, pairs: Pairs, beside: Near | None) -> _Seen:
-    """Each piece from the middle of its block."""
-    V = search.tab.types.Vector
-    p = dr.gather(type(blocks.p), blocks.p, pairs.block)
-    normal = dr.gather(type(blocks.n), blocks.n, pairs.block)
-    radius = search.tab.types.Float(dr.gather(mi.Float, blocks.radius, pairs.block))
-    x = mi.Point3f(p)
-    if search.probe is not None:
-        x = x + search.probe.epsilon(x) * normal
-    by = None
-    if beside is not None and search.grazing is not None:
-        by = beside.of(pairs.block, mi.Bool(True), search.grazing)
-    found = _from_middle(search, frames.some(pairs.block), pairs.piece, x, V(normal), radius, by)
-    open_, idle, weak, far, inner2, start, stop, passes = found
-    seen = _Seen(open_, idle, weak, far, mi.Float(inner2), mi.Float(start), mi.Float(stop), passes)
-    dr.eval(*seen)
-    return seen
-
-
-@dr.syntax
-def _from_middle(
-    search: Search, fr: Frame, i: Any, p: Any, n: Any, radius: Any, beside: Near | None
-) -> tuple[Any, ...]:
-    """What is in `_Seen`, along pieces i, for receivers within `radius` of P."""
-    tab, k, probe = search.tab, search.k, search.probe
-    F = tab.types.Float
-    piece = tab.piece(i)
-    acts = sounds(fr, piece, n)
-    clear = dr.mask_t(F)(acts)
-    size = cut_off(fr, piece, k)
-    far, inner2, start, stop = _along(search, fr, piece, radius)
-    idle = far & _is_idle(inner2, start, stop, search.tolerance)
-    if dr.hint(probe is not None, mode="scalar"):
-        assert probe is not None
-        tested = acts & (size > search.share) & ~idle
-        if tested:
-            x = mi.Point3f(piece.middle + constant(tab.types.Vector, tab.centre))
-            clear = acts & probe.reaches(x, piece, p, tested)
-    room = piece._replace(reach=piece.reach + radius)
-    weak = (cut_off(fr, room, k) < WEAK * search.tolerance) & (
-        dr.squared_norm(fr.foot + fr.z2 * fr.a - piece.middle) > dr.square(REMOTE * radius)
-    )
-    passes = dr.mask_t(F)(False)
-    if dr.hint(beside is not None, mode="scalar"):
-        assert beside is not None
-        _, v2, close = other_than(beside, piece)
-        if close:
-            passes = worth(size, v2, search.tolerance)
-    return clear, idle, weak, far, inner2, start, stop, passes
-
-
-def _is_idle(inner2: Any, start: Any, stop: Any, tolerance: float) -> Any:
-    """Whether nothing is asked of a far piece, whether it reaches a block or not: all its corners are left out."""
-    limit = CORNER * 2 * np.pi * tolerance
-    return (inner2 < limit * limit) & (dr.maximum(dr.abs(start), dr.abs(stop)) < limit)
-
-
-@dr.syntax
-def _along(search: Search, fr: Frame, piece: Piece, radius: Any) -> tuple[Any, ...]:
-    """What is in `_Seen` of a piece's segments: `far`, `inner2`, `start` and `stop`."""
-    tab, k, rule = search.tab, search.k, search.rule.corners
-    assert rule is not None
-    F = tab.types.Float
-    far = dr.mask_t(F)(True)
-    inner2, start, stop = F(0), F(0), F(0)
-    j = dr.uint32_array_t(F)(piece.first)
-    last = tuple(corner(fr, tab.corner(j, 0), k))
-    while j < piece.end:
-        a, b = Corner(*last), corner(fr, tab.corner(j, 1), k)
-        at = slopes(fr.a, a, b, k)
-        margin = k * radius * dr.sqrt(at.length2) * dr.rsqrt(dr.minimum(a.to_p2, b.to_p2))
-        least = dr.minimum(dr.abs(at.a), dr.abs(at.b)) - margin
-        far &= (at.a * at.b > 0) & (least > 0) & (dr.minimum(a.d2, b.d2) > 4 * dr.square(radius))
-        far &= dr.square(least) > 2 * rule.far * k * at.length2 * dr.maximum(a.inv, b.inv)
-        end_a, end_b = at.turn * a.C / (a.d2 * at.a), at.turn * b.C / (b.d2 * at.b)
-        begins = j == piece.first
-        inner2 += dr.select(begins, 0, dr.square(end_a - stop))
-        start = dr.select(begins, end_a, start)
-        stop = end_b
-        last = tuple(b)
-        j += 1
-    return far, inner2, start, stop
