@@ -11,6 +11,7 @@ from grimaldi.diffraction.edges import cut_off, sounds
 from grimaldi.diffraction.fine import Fine, place
 from grimaldi.diffraction.fine import corner as corner_place
 from grimaldi.diffraction.frame import Frame, constant
+from grimaldi.diffraction.hierarchy import NONE
 from grimaldi.diffraction.lists import FINELY, INNER, places
 from grimaldi.diffraction.model import ACROSS, LATTICE, Blocks
 from grimaldi.diffraction.search import Pairs, Search
@@ -21,6 +22,10 @@ FAINT = 0.1  # of the tolerance: |M| at all four corners of a cell of an end tha
 STRONG = 0.5  # and of one that grows so between INNER × INNER places of it, or corners on a curved block
 ALL = (1 << ACROSS * ACROSS) - 1  # cells
 EVERY = (1 << LATTICE * LATTICE) - 1  # corners
+FIRST_ROW = sum(1 << x for x in range(1, LATTICE))  # but for the very first corner, that only its own block asks for
+FIRST_COLUMN = sum(1 << (y * LATTICE) for y in range(1, LATTICE))
+ABOVE, LEFT = (LATTICE - 1) * LATTICE, LATTICE - 1  # bits further on, that blocks above and to the left have the same
+UP, LEFTWARDS = 1, 3  # places in `Blocks.beside`
 COARSE = sum(1 << (y * LATTICE + x) for y in range(0, LATTICE, 2) for x in range(0, LATTICE, 2))  # every other corner
 
 
@@ -142,20 +147,54 @@ def _filled(bits: Any, members: Any) -> Any:
 
 
 def _reached(search: Search, blocks: Blocks, fine: Fine, pairs: Pairs, pair: Any, asked: Any) -> Any:
-    """Which of the `asked` corners of cells the pieces of pairs reach; a bit for each."""
+    """Which of the `asked` corners of cells the pieces of pairs reach; a bit for each.
+
+    What the blocks above and to the left share with a block is asked for there, if it is.
+    """
     corners = LATTICE * LATTICE
+    above, left = _beside(search, blocks, pairs, pair)
+    shared = (above.at(asked) >> ABOVE) & FIRST_ROW, (left.at(asked) >> LEFT) & FIRST_COLUMN
+    own = asked & ~(shared[0] | shared[1])
+    dr.eval(own)
     index = dr.arange(mi.UInt32, len(pair) * corners)
     of = index // corners
-    some = places(((dr.gather(mi.UInt32, asked, of) >> (index - of * corners)) & 1) != 0)
+    some = places(((dr.gather(mi.UInt32, own, of) >> (index - of * corners)) & 1) != 0)
     of = some // corners
-    place, own = some - of * corners, dr.gather(mi.UInt32, pair, of)
-    block = dr.gather(mi.UInt32, pairs.block, own)
+    place, at = some - of * corners, dr.gather(mi.UInt32, pair, of)
+    block = dr.gather(mi.UInt32, pairs.block, at)
     n = dr.gather(type(blocks.normals), blocks.normals, block * corners + place)
-    acts = _reaches(search, fine, corner_place(block, place), n, dr.gather(mi.UInt32, pairs.piece, own))
+    acts = _reaches(search, fine, corner_place(block, place), n, dr.gather(mi.UInt32, pairs.piece, at))
     bits = dr.zeros(mi.UInt32, len(pair))
     dr.scatter_add(bits, dr.select(acts, mi.UInt32(1) << place, 0), of)
     dr.eval(bits)
+    bits |= ((above.at(bits) >> ABOVE) & shared[0]) | ((left.at(bits) >> LEFT) & shared[1])
+    dr.eval(bits)
     return bits & asked
+
+
+class _Beside(NamedTuple):
+    """For each of some pairs the one of the same piece and a block beside, if there is one."""
+
+    index: Any
+    there: Any
+
+    def at(self, values: Any) -> Any:
+        """What those have; 0 where there is none."""
+        return dr.gather(mi.UInt32, values, self.index, self.there)
+
+
+def _beside(search: Search, blocks: Blocks, pairs: Pairs, pair: Any) -> tuple[_Beside, _Beside]:
+    """Above and to the left in the same plane."""
+    n = int(search.tab.n_pieces[0])
+    entries = dr.full(mi.UInt32, NONE, dr.width(blocks.p) * n)
+    dr.scatter(entries, dr.arange(mi.UInt32, len(pair)), dr.gather(mi.UInt32, pairs.index, pair))
+    block, piece = (dr.gather(mi.UInt32, v, pair) for v in (pairs.block, pairs.piece))
+    found = []
+    for side in (UP, LEFTWARDS):
+        other = dr.gather(mi.UInt32, blocks.beside[side], block)
+        entry = dr.gather(mi.UInt32, entries, other * n + piece)
+        found.append(_Beside(entry, (other != block) & (entry != NONE)))
+    return found[0], found[1]
 
 
 def finely(search: Search, blocks: Blocks, fine: Fine, block: Any, piece: Any, cell: Any) -> Any:
