@@ -19,7 +19,7 @@ from grimaldi.diffraction.table import Piece
 mi: Any = mitsuba  # the stubs refuse numbers where arrays are asked for
 
 CORNER = 0.0035  # of the tolerance: |M| of a corner that is left out
-WEAK = 0.3  # of the tolerance: |M| of an end that grows evenly between corners of cells which it reaches or not
+WEAK = 0.35  # of the tolerance: |M| of an end that grows evenly between corners of cells which it reaches or not
 REMOTE = 1.5  # radii of a block, that such a piece is away from it at least
 LEFT, RIGHT = 3, 4  # places in `Blocks.beside`
 

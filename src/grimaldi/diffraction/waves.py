@@ -18,10 +18,10 @@ from grimaldi.diffraction.search import Pairs, Search
 
 mi: Any = mitsuba  # the stubs refuse numbers where arrays are asked for
 
-FITS = 0.05  # of the tolerance: what all chirps of a block may leave of M in the mean, each as much as the others
+FITS = 0.08  # of the tolerance: what all chirps of a block may leave of M in the mean, each as much as the others
 BEATS = 3.0  # turns, by which a piece's ends may be further apart in one place of a block than in another: beats
 # between those where waves are asked for would look like none
-AWAY = 0.7  # radii of a block, that rays to it pass by the piece at least: waves beside a ray change within pixels
+AWAY = 0.5  # radii of a block, that rays to it pass by the piece at least: waves beside a ray change within pixels
 OFF = 2.0  # likewise, of a curved one, whose receivers may lie anywhere in a ball
 SMALL = 0.05  # of the tolerance: the sum of |M| of waves that are left out
 STEPS = 8  # powers of two that are tried as the largest of these
