@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import drjit as dr
 import mitsuba
 
-from grimaldi.diffraction.frame import Frame
+from grimaldi.diffraction.frame import Frames
 from grimaldi.diffraction.model import ACROSS, LATTICE, Blocks
 from grimaldi.diffraction.search import Search
 
@@ -23,7 +23,7 @@ class Fine(NamedTuple):
     """
 
     p: Any  # Float64 (3)
-    frames: Frame
+    frames: Frames
 
     @staticmethod
     def of(search: Search, blocks: Blocks) -> Fine:

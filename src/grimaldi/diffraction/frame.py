@@ -30,10 +30,28 @@ class Frame(NamedTuple):
     lever: Any  # what its rounding is relative to
     plane: bool
 
+
+class Frames(NamedTuple):
+    """Frames of many rays as three packets each, which are read sooner than their nine numbers."""
+
+    packets: Any
+    types: Types
+    plane: bool
+
+    @staticmethod
+    def of(fr: Frame, n: int, types: Types) -> Frames:
+        """Those of n rays, evaluated."""
+        index = dr.arange(dr.uint32_array_t(types.Float), n)
+        packets = dr.zeros(types.Float, 12 * n)
+        for j, numbers in enumerate(((*fr.a, fr.z1), (*fr.foot, fr.z2), (fr.lever, 0, 0, 0))):
+            dr.scatter(packets, types.Packet(*numbers), 3 * index + j)
+        dr.eval(packets)
+        return Frames(packets, types, fr.plane)
+
     def some(self, index: Any) -> Frame:
         """Those at places of the arrays."""
-        a, foot, z1, z2, lever = (dr.gather(type(values), values, index) for values in self[:5])
-        return Frame(a, foot, z1, z2, lever, self.plane)
+        V, (a, b, c) = self.types.Vector, (dr.gather(self.types.Packet, self.packets, 3 * index + j) for j in range(3))
+        return Frame(V(a.x, a.y, a.z), V(b.x, b.y, b.z), a.w, b.w, c.x, self.plane)
 
 
 def constant(Vector3: Any, v: Vector) -> Any:

@@ -16,7 +16,7 @@ import numpy as np
 from grimaldi.diffraction.chirps import QUADRANTS, quadrant
 from grimaldi.diffraction.edges import sounds
 from grimaldi.diffraction.fine import Fine
-from grimaldi.diffraction.frame import Frame
+from grimaldi.diffraction.frame import Frame, Frames
 from grimaldi.diffraction.grazing import Near, near
 from grimaldi.diffraction.hierarchy import NONE, least_detour
 from grimaldi.diffraction.lists import List, Lists, Parts, Runs, places
@@ -190,7 +190,7 @@ def _in_cells(
     )
 
 
-def _pairs(search: Search, blocks: Blocks, frames: Frame, n: int) -> Pairs:
+def _pairs(search: Search, blocks: Blocks, frames: Frames, n: int) -> Pairs:
     """Which of n pieces may act somewhere in a block: within the outlines' reach, and above some horizon."""
     tab, F = search.tab, search.tab.types.Float
     index = dr.arange(mi.UInt32, dr.width(blocks.p) * n)
@@ -235,11 +235,12 @@ def _finest(fr: Frame, k: Any, blocks: Blocks, block: Any, piece: Piece) -> Any:
     return finest * k / (2 * np.pi)
 
 
-def _beside(search: Search, blocks: Blocks, frames: Frame) -> Near | None:
+def _beside(search: Search, blocks: Blocks, frames: Frames) -> Near | None:
     """The bodies whose silhouettes rays to each block pass closest by."""
     if search.grazing is None:
         return None
     middle = Receivers(blocks.p, blocks.n, blocks.active)
-    found = near(frames, search.grazing, search.k, middle, search.tab.types.Float(blocks.radius))
+    every = frames.some(dr.arange(mi.UInt32, dr.width(blocks.p)))
+    found = near(every, search.grazing, search.k, middle, search.tab.types.Float(blocks.radius))
     dr.eval(found.body, found.v2, found.next_body, found.next_v2)
     return found

@@ -10,7 +10,7 @@ import numpy as np
 
 from grimaldi.diffraction.corners import Corner, corner, slopes
 from grimaldi.diffraction.edges import cut_off, sounds
-from grimaldi.diffraction.frame import Frame, constant
+from grimaldi.diffraction.frame import Frame, Frames, constant
 from grimaldi.diffraction.grazing import Near, other_than, worth
 from grimaldi.diffraction.model import Blocks
 from grimaldi.diffraction.search import Pairs, Search
@@ -37,7 +37,7 @@ class Seen(NamedTuple):
     passes: Any  # whether the way to the block grazes another body's silhouette
 
 
-def seen_from_middles(search: Search, blocks: Blocks, frames: Frame, pairs: Pairs, beside: Near | None) -> Seen:
+def seen_from_middles(search: Search, blocks: Blocks, frames: Frames, pairs: Pairs, beside: Near | None) -> Seen:
     """Each piece from the middle of its block."""
     found, tested = _unhindered(search, blocks, frames, pairs, beside)
     if search.probe is not None:
@@ -45,7 +45,7 @@ def seen_from_middles(search: Search, blocks: Blocks, frames: Frame, pairs: Pair
     return found
 
 
-def _unhindered(search: Search, blocks: Blocks, frames: Frame, pairs: Pairs, beside: Near | None) -> tuple[Seen, Any]:
+def _unhindered(search: Search, blocks: Blocks, frames: Frames, pairs: Pairs, beside: Near | None) -> tuple[Seen, Any]:
     """The same if nothing stood between; and which of the pieces are worth a ray."""
     tab, k, tolerance = search.tab, search.k, search.tolerance
     fr, piece = frames.some(pairs.block), tab.piece(pairs.piece)

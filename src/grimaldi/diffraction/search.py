@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import drjit as dr
 
-from grimaldi.diffraction.frame import Frame, frame
+from grimaldi.diffraction.frame import Frames, frame
 from grimaldi.diffraction.grazing import Chords
 from grimaldi.diffraction.occlusion import Rays
 from grimaldi.diffraction.segment import Rule
@@ -30,11 +30,9 @@ class Search(NamedTuple):
     probe: Rays | None
     grazing: Chords | None
 
-    def frames(self, p: Any) -> Frame:
+    def frames(self, p: Any) -> Frames:
         """Of points (Float64), evaluated: once for each, not once for each piece."""
-        frames = frame(self.source, p, self.tab)
-        dr.eval(*frames[:5])
-        return frames
+        return Frames.of(frame(self.source, p, self.tab), dr.width(p), self.tab.types)
 
 
 class Pairs(NamedTuple):

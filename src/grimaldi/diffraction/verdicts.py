@@ -10,7 +10,7 @@ import mitsuba
 from grimaldi.diffraction.edges import cut_off, sounds
 from grimaldi.diffraction.fine import Fine, place
 from grimaldi.diffraction.fine import corner as corner_place
-from grimaldi.diffraction.frame import Frame, constant
+from grimaldi.diffraction.frame import Frames, constant
 from grimaldi.diffraction.hierarchy import NONE
 from grimaldi.diffraction.lists import FINELY, INNER, places
 from grimaldi.diffraction.model import ACROSS, LATTICE, Blocks
@@ -93,7 +93,7 @@ def verdicts_of(
     return verdicts
 
 
-def _left(search: Search, frames: Frame, pairs: Pairs, pair: Any, some: Any) -> tuple[Any, Any]:
+def _left(search: Search, frames: Frames, pairs: Pairs, pair: Any, some: Any) -> tuple[Any, Any]:
     """At which corners of cells a chain cut off on the pieces of some pairs leaves less than FAINT of the tolerance,
     and less than STRONG; a bit for each."""
     tab, corners = search.tab, LATTICE * LATTICE

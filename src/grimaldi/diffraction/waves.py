@@ -10,7 +10,7 @@ import numpy as np
 
 from grimaldi.diffraction.bundles import bundled
 from grimaldi.diffraction.chirps import FARTHEST, PLACES, QUADRANTS, Chirps, Fit, Samples, fit, place_of, sampled
-from grimaldi.diffraction.frame import Frame
+from grimaldi.diffraction.frame import Frames
 from grimaldi.diffraction.hierarchy import NONE
 from grimaldi.diffraction.lists import List, places
 from grimaldi.diffraction.model import Blocks
@@ -42,7 +42,7 @@ class Waves(NamedTuple):
 
 
 def waves(
-    search: Search, blocks: Blocks, frames: Frame, at_places: Frame, pairs: Pairs, wanted: Any, whole: Any
+    search: Search, blocks: Blocks, frames: Frames, at_places: Frames, pairs: Pairs, wanted: Any, whole: Any
 ) -> Waves:
     """Of the wanted pairs; frames: of the rays to the middles of blocks, and to `Fine` places.
 
@@ -92,7 +92,7 @@ def waves(
 
 
 def _in_quadrants(
-    search: Search, frames: Frame, block: Any, piece: Any, least: Any, allowed: Any
+    search: Search, frames: Frames, block: Any, piece: Any, least: Any, allowed: Any
 ) -> tuple[Fit, Any, Any, Any]:
     """Chirps in all quadrants of blocks: of which of these, in which quadrant, and whether they serve.
 
@@ -107,7 +107,7 @@ def _in_quadrants(
     return found, entry, of, serves
 
 
-def _of_curved(size: Any, search: Search, blocks: Blocks, frames: Frame, pairs: Pairs, wanted: Any) -> None:
+def _of_curved(size: Any, search: Search, blocks: Blocks, frames: Frames, pairs: Pairs, wanted: Any) -> None:
     """Put sizes of the wanted pairs, whose blocks are curved, where waves do not change over these."""
     pair = places(wanted)
     block, piece = (dr.gather(mi.UInt32, of, pair) for of in pairs[:2])
@@ -117,7 +117,7 @@ def _of_curved(size: Any, search: Search, blocks: Blocks, frames: Frame, pairs: 
     dr.scatter(size, mi.Float(dr.sqrt(dr.square(there.real) + dr.square(there.imag))), pair, apart)
 
 
-def _samples(search: Search, frames: Frame, block: Any, piece: Any, of: Any | None = None) -> Samples:
+def _samples(search: Search, frames: Frames, block: Any, piece: Any, of: Any | None = None) -> Samples:
     """What pieces send to each of PLACES of blocks, or `of` quadrants of theirs."""
     index = dr.arange(mi.UInt32, PLACES * len(piece))
     own = index // PLACES
