@@ -13,6 +13,7 @@ import drjit as dr
 import mitsuba
 import numpy as np
 
+from grimaldi.diffraction.arrays import Types
 from grimaldi.diffraction.chirps import QUADRANTS, quadrant
 from grimaldi.diffraction.edges import sounds
 from grimaldi.diffraction.fine import Fine
@@ -32,6 +33,7 @@ mi: Any = mitsuba  # the stubs refuse numbers where arrays are asked for
 FINEST = 1.0  # cycles a pixel of fringes, from which on a picture's mean over pixels does without them,
 AVERAGED = 0.05  # at this tolerance and above; below, more in proportion
 SQUARES = 1 << 16  # parts of its square, in which it is counted: sums of whole numbers are the same in any order
+SPANS = (0, LATTICE - 1, LATTICE * LATTICE // 2, LATTICE * (LATTICE - 1), LATTICE * LATTICE - 1)  # corners of a block
 UNTESTED = 0.1  # of the tolerance: |M| of an end that reaches a block or not as a whole, by what its middle says
 
 
@@ -199,34 +201,48 @@ def _pairs(search: Search, blocks: Blocks, frames: Frames, n: int) -> Pairs:
     detour = least_detour(frames.some(block), middle, reach + F(dr.gather(mi.Float, blocks.radius, block)))
     found = places(dr.gather(mi.Bool, blocks.active, block) & (detour <= tab.far))
 
+    spans = _spans(blocks, tab.types)
     block = found // n
     piece, fr = tab.piece(found - block * n), frames.some(block)
     radius, bend = (F(dr.gather(mi.Float, of, block)) for of in (blocks.radius, blocks.bend))
     normal = tab.types.Vector(dr.gather(type(blocks.n), blocks.n, block))
     d = fr.foot + fr.z2 * fr.a - piece.middle
     acts = dr.select(bend == 0, sounds(fr, piece, normal), dr.dot(normal, d) < radius + bend * dr.norm(d))
-    acts &= _finest(fr, search.k, blocks, block, piece) <= FINEST * max(AVERAGED / search.tolerance, 1.0)
+    acts &= _finest(fr, search.k, spans, tab.types, block, piece) <= FINEST * max(AVERAGED / search.tolerance, 1.0)
     found = dr.gather(mi.UInt32, found, places(acts))
     block = found // n
     dr.eval(found, block)
     return Pairs(block, found - block * n, found)
 
 
-def _finest(fr: Frame, k: Any, blocks: Blocks, block: Any, piece: Piece) -> Any:
+def _spans(blocks: Blocks, types: Types) -> Any:
+    """From the middle of each block to SPANS, and a pixel's way along rows and columns, as packets; evaluated."""
+    number = dr.width(blocks.p)
+    index = dr.arange(mi.UInt32, number)
+    corners = (dr.gather(type(blocks.lattice), blocks.lattice, LATTICE * LATTICE * index + i) for i in SPANS)
+    vectors = *(corner - blocks.p for corner in corners), blocks.right, blocks.down
+    packets = dr.zeros(types.Float, 4 * len(vectors) * number)
+    for j, v in enumerate(vectors):
+        dr.scatter(packets, types.Packet(*types.Vector(v), 0), len(vectors) * index + j)
+    dr.eval(packets)
+    return packets
+
+
+def _finest(fr: Frame, k: Any, spans: Any, types: Types, block: Any, piece: Piece) -> Any:
     """Cycles a pixel of a piece's fringes with the direct light, along rows or columns, where a block has the widest.
 
     ∇Δ at P is the direction X→P less that of S→P. Where it changes sign between corners fringes are wide somewhere.
     """
-    V, corners = type(piece.middle), LATTICE * LATTICE
+    count = len(SPANS) + 2
+    rows = (dr.gather(types.Packet, spans, count * block + j) for j in range(count))
+    *corners, right, down = (types.Vector(row.x, row.y, row.z) for row in rows)
     P = fr.foot + fr.z2 * fr.a - piece.middle
-    middle = dr.gather(type(blocks.p), blocks.p, block)
     slopes = []
-    for i in (0, LATTICE - 1, corners // 2, corners - LATTICE, corners - 1):
-        d = P + V(dr.gather(type(blocks.lattice), blocks.lattice, block * corners + i) - middle)
+    for corner in corners:
+        d = P + corner
         slopes.append(d / dr.norm(d) - fr.a)
     finest = type(piece.reach)(0)
-    for side in (blocks.right, blocks.down):
-        along = V(dr.gather(type(side), side, block))
+    for along in (right, down):
         cycles = [dr.dot(along, slope) for slope in slopes]
         low, high = cycles[0], cycles[0]
         for c in cycles:
