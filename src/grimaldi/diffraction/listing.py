@@ -35,6 +35,7 @@ AVERAGED = 0.05  # at this tolerance and above; below, more in proportion
 SQUARES = 1 << 16  # parts of its square, in which it is counted: sums of whole numbers are the same in any order
 SPANS = (0, LATTICE - 1, LATTICE * LATTICE // 2, LATTICE * (LATTICE - 1), LATTICE * LATTICE - 1)  # corners of a block
 UNTESTED = 0.1  # of the tolerance: |M| of an end that reaches a block or not as a whole, by what its middle says
+ACTS, HIDDEN = 1, 2  # whether a piece acts in a block, or is known not to reach it
 
 
 def lists(search: Search, blocks: Blocks) -> Lists:
@@ -47,14 +48,14 @@ def lists(search: Search, blocks: Blocks) -> Lists:
     seen = seen_from_middles(search, blocks, frames, pairs, beside)
 
     # where a piece reaches this block but not the next in the same plane, it may not reach all of it
-    open_, closed = dr.zeros(mi.Bool, number * n), dr.zeros(mi.Bool, number * n)
-    dr.scatter(open_, seen.open & ~seen.idle, pairs.index)
-    dr.scatter(closed, ~seen.open, pairs.index)
+    states = dr.zeros(mi.UInt32, number * n)
+    dr.scatter(states, dr.select(seen.open, dr.select(seen.idle, mi.UInt32(0), ACTS), HIDDEN), pairs.index)
     curved = dr.gather(mi.Float, blocks.bend, pairs.block) > 0
     changes = mi.Bool(curved)
+    other_state = dr.select(seen.open, mi.UInt32(HIDDEN), ACTS)
     for side in blocks.beside:
         other = dr.gather(mi.UInt32, side, pairs.block) * n + pairs.piece
-        changes |= dr.select(seen.open, dr.gather(mi.Bool, closed, other), dr.gather(mi.Bool, open_, other))
+        changes |= dr.gather(mi.UInt32, states, other) == other_state
     limit = 2 * np.pi * tolerance
     faint = seen.far & (dr.maximum(dr.abs(seen.start), dr.abs(seen.stop)) < UNTESTED * limit)
     tested = ((curved | changes) & ~faint) | seen.passes

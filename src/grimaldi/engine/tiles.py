@@ -297,18 +297,18 @@ def _means(traced: _Traced, shot: Shot, first: int) -> Tile:
     """What the samples of each pixel say."""
     finite, seen = traced.finite, traced.finite & traced.seen
 
-    def mean(values: Any, over: Any) -> Any:
-        count = dr.block_sum(dr.select(over, mi.Float(1), 0), shot.spp)
-        return dr.block_sum(dr.select(over, mi.Float(values), 0), shot.spp) / dr.maximum(count, 1)
+    def total(values: Any, over: Any) -> Any:
+        return dr.block_sum(dr.select(over, mi.Float(values), 0), shot.spp)
 
-    picture = [mean(channel, finite) for channel in traced.radiance]
-    real = [mean(x, seen) for x in traced.real]
-    imag = [mean(x, seen) for x in traced.imag]
-    error = [mean(x, seen) for x in traced.error]
+    of_all, of_seen = (dr.maximum(total(1, over), 1) for over in (finite, seen))
+    dr.eval(of_all, of_seen)
+
+    picture = [total(channel, finite) / of_all for channel in traced.radiance]
+    real, imag, error = ([total(x, seen) / of_seen for x in values] for values in traced[3:])
     power = mi.Float64(0)
     for re, im in zip(traced.real, traced.imag, strict=True):
         power += re * re + im * im
-    intensity = mean(power, seen)
+    intensity = total(power, seen) / of_seen
     lost: Any = dr.count(~finite)
     dr.eval(picture, real, imag, error, intensity, lost)
     return Tile(
