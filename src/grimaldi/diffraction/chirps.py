@@ -1,7 +1,7 @@
 """Waves over a flat block of receivers as chirps: what a piece sends there is A e^{iψ}, A and ψ quadratic in the place.
 
 k(r + s - R) bends by little over the few pixels of a block, and what a short piece sends besides changes slowly. So a
-wave is asked for at nine places of a block, and told anywhere in it for a sine and a cosine; where these and four
+wave is asked for at nine places of a block, and told anywhere in it for a sine and a cosine; where these and two
 places between are not told closely enough it is no chirp there, but may be in a quadrant of the block (`waves`).
 """
 
@@ -28,7 +28,7 @@ mi: Any = mitsuba  # the stubs refuse numbers where arrays are asked for
 
 SIDE = 3  # places across a block, by which waves are told
 GRID = [(u, v) for v in (-1.0, 0.0, 1.0) for u in (-1.0, 0.0, 1.0)]
-BETWEEN = [(u, v) for v in (-0.5, 0.5) for u in (-0.5, 0.5)]  # and by which that is tried
+BETWEEN = [(u, 0.5) for u in (-0.5, 0.5)]
 PLACES = len(GRID) + len(BETWEEN)
 QUADRANTS = 4
 PACKETS = 3
