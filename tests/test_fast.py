@@ -16,14 +16,14 @@ from scipy.interpolate import RegularGridInterpolator
 
 import grimaldi
 from grimaldi.bench import scenes
-from grimaldi.diffraction import bundles, fine, waves
+from grimaldi.diffraction import bundles, fine, listing, middles, verdicts, waves
 from grimaldi.diffraction.arrays import types
 from grimaldi.diffraction.boundary import boundary
 from grimaldi.diffraction.chirps import BETWEEN, FARTHEST, GRID, PLACES, Samples, fit
 from grimaldi.diffraction.frame import Frame
 from grimaldi.diffraction.hierarchy import NONE, layout, least_detour
 from grimaldi.diffraction.lists import FINELY, INNER, List, Parts, listed_sum
-from grimaldi.diffraction.model import OUTSIDE, Evaluate, Factor, Options, Receivers
+from grimaldi.diffraction.model import LEFT, OUTSIDE, UP, Evaluate, Factor, Options, Receivers
 from grimaldi.diffraction.reach import reach
 from grimaldi.engine.asking import Recordings, ask
 from grimaldi.engine.blocks import Sight, Squares, squares
@@ -284,6 +284,60 @@ def test_waves_are_left_out_as_long_as_all_of_them_make_little(monkeypatch):
     assert many.everywhere.begin.numpy()[-1] < every.everywhere.begin.numpy()[-1]
     assert 0 < off.max() < 2 * 0.05 * tolerance
     assert 0 < (many.left.numpy() - every.left.numpy()).max() <= 0.05 * tolerance
+
+
+def test_corners_that_blocks_share_are_asked_for_once(monkeypatch):
+    """And lists are the same as if each asked for all of its own."""
+    monkeypatch.setattr(scenes, "WAVELENGTH", 2.0)
+    rays, lists = [], []
+
+    def counted(*parts: Any) -> Any:
+        rays.append(len(parts[-1]))
+        return reaches(*parts)
+
+    reaches = verdicts._reaches
+    monkeypatch.setattr(verdicts, "_reaches", counted)
+    floor = Floor(5e-2, "graded")
+    factor: Any = floor.light.beams[0].factor
+    for _ in range(2):
+        lists.append(factor.single.lists(floor.film.blocks).partly)
+        rays.append(0)
+        monkeypatch.setattr(verdicts, "FIRST_ROW", 0)
+        monkeypatch.setattr(verdicts, "FIRST_COLUMN", 0)
+    end = rays.index(0)
+    assert 0 < sum(rays[:end]) < 0.9 * sum(rays[end:])
+    for one, other in zip(*lists, strict=True):
+        np.testing.assert_array_equal(one.begin if isinstance(one, List) else one, getattr(other, "begin", other))
+
+
+def test_blocks_of_a_floor_know_those_beside_them():
+    """Its normals are of Float32, a little shorter than 1."""
+    blocks = Floor(5e-2, "none").film.blocks
+    index = np.arange(16)
+    np.testing.assert_array_equal(blocks.beside[LEFT].numpy(), np.where(index % 4 == 0, index, index - 1))
+    np.testing.assert_array_equal(blocks.beside[UP].numpy(), np.where(index < 4, index, index - 4))
+
+
+def test_blocks_between_others_are_told_what_a_ray_tells(monkeypatch):
+    """But for few, where a shadow is thinner than a block."""
+    monkeypatch.setattr(scenes, "WAVELENGTH", 2.0)
+    asked: list[Any] = []
+
+    def kept(*parts: Any) -> Any:
+        asked.append(parts)
+        return seen(*parts)
+
+    seen = middles.seen_from_middles
+    monkeypatch.setattr(listing, "seen_from_middles", kept)
+    floor = Floor(5e-2, "graded")
+    factor: Any = floor.light.beams[0].factor
+    factor.single.lists(floor.film.blocks)
+    told = seen(*asked[0]).open.numpy()
+    tested = middles._unhindered(*asked[0])
+    search, blocks, _, pairs, _ = asked[0]
+    middles._test(tested[0].open, tested[1], search, blocks, pairs)
+    assert (tested[0].open.numpy() & tested[1].numpy()).sum() > 100
+    assert (told != tested[0].open.numpy()).mean() < 2e-3
 
 
 def test_a_square_has_a_block_for_each_of_three_surfaces():

@@ -12,7 +12,7 @@ from grimaldi.diffraction.corners import Corner, corner, slopes
 from grimaldi.diffraction.edges import cut_off, sounds
 from grimaldi.diffraction.frame import Frame, Frames, constant
 from grimaldi.diffraction.grazing import Near, other_than, worth
-from grimaldi.diffraction.model import Blocks
+from grimaldi.diffraction.model import LEFT, RIGHT, Blocks
 from grimaldi.diffraction.search import Pairs, Search
 from grimaldi.diffraction.table import Piece
 
@@ -21,7 +21,6 @@ mi: Any = mitsuba  # the stubs refuse numbers where arrays are asked for
 CORNER = 0.0035  # of the tolerance: |M| of a corner that is left out
 WEAK = 0.35  # of the tolerance: |M| of an end that grows evenly between corners of cells which it reaches or not
 REMOTE = 1.5  # radii of a block, that such a piece is away from it at least
-LEFT, RIGHT = 3, 4  # places in `Blocks.beside`
 
 
 class Seen(NamedTuple):

@@ -64,6 +64,7 @@ class Receivers(NamedTuple):
 OUTSIDE = 0xFFFFFFFF
 ACROSS = 4  # cells across a block
 LATTICE = ACROSS + 1  # corners of those
+UP, LEFT, RIGHT = 1, 3, 4  # places in `Blocks.beside`
 
 
 class Blocks(NamedTuple):

@@ -13,7 +13,7 @@ from grimaldi.diffraction.fine import corner as corner_place
 from grimaldi.diffraction.frame import Frames, constant
 from grimaldi.diffraction.hierarchy import NONE
 from grimaldi.diffraction.lists import FINELY, INNER, places
-from grimaldi.diffraction.model import ACROSS, LATTICE, Blocks
+from grimaldi.diffraction.model import ACROSS, LATTICE, LEFT, UP, Blocks
 from grimaldi.diffraction.search import Pairs, Search
 
 mi: Any = mitsuba  # the stubs refuse numbers where arrays are asked for
@@ -24,8 +24,7 @@ ALL = (1 << ACROSS * ACROSS) - 1  # cells
 EVERY = (1 << LATTICE * LATTICE) - 1  # corners
 FIRST_ROW = sum(1 << x for x in range(1, LATTICE))  # but for the very first corner, that only its own block asks for
 FIRST_COLUMN = sum(1 << (y * LATTICE) for y in range(1, LATTICE))
-ABOVE, LEFT = (LATTICE - 1) * LATTICE, LATTICE - 1  # bits further on, that blocks above and to the left have the same
-UP, LEFTWARDS = 1, 3  # places in `Blocks.beside`
+LAST_ROW, LAST_COLUMN = (LATTICE - 1) * LATTICE, LATTICE - 1  # bits further on, that blocks beside have those
 COARSE = sum(1 << (y * LATTICE + x) for y in range(0, LATTICE, 2) for x in range(0, LATTICE, 2))  # every other corner
 
 
@@ -153,7 +152,7 @@ def _reached(search: Search, blocks: Blocks, fine: Fine, pairs: Pairs, pair: Any
     """
     corners = LATTICE * LATTICE
     above, left = _beside(search, blocks, pairs, pair)
-    shared = (above.at(asked) >> ABOVE) & FIRST_ROW, (left.at(asked) >> LEFT) & FIRST_COLUMN
+    shared = (above.at(asked) >> LAST_ROW) & FIRST_ROW, (left.at(asked) >> LAST_COLUMN) & FIRST_COLUMN
     own = asked & ~(shared[0] | shared[1])
     dr.eval(own)
     index = dr.arange(mi.UInt32, len(pair) * corners)
@@ -167,7 +166,7 @@ def _reached(search: Search, blocks: Blocks, fine: Fine, pairs: Pairs, pair: Any
     bits = dr.zeros(mi.UInt32, len(pair))
     dr.scatter_add(bits, dr.select(acts, mi.UInt32(1) << place, 0), of)
     dr.eval(bits)
-    bits |= ((above.at(bits) >> ABOVE) & shared[0]) | ((left.at(bits) >> LEFT) & shared[1])
+    bits |= ((above.at(bits) >> LAST_ROW) & shared[0]) | ((left.at(bits) >> LAST_COLUMN) & shared[1])
     dr.eval(bits)
     return bits & asked
 
@@ -190,7 +189,7 @@ def _beside(search: Search, blocks: Blocks, pairs: Pairs, pair: Any) -> tuple[_B
     dr.scatter(entries, dr.arange(mi.UInt32, len(pair)), dr.gather(mi.UInt32, pairs.index, pair))
     block, piece = (dr.gather(mi.UInt32, v, pair) for v in (pairs.block, pairs.piece))
     found = []
-    for side in (UP, LEFTWARDS):
+    for side in (UP, LEFT):
         other = dr.gather(mi.UInt32, blocks.beside[side], block)
         entry = dr.gather(mi.UInt32, entries, other * n + piece)
         found.append(_Beside(entry, (other != block) & (entry != NONE)))

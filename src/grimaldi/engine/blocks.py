@@ -133,6 +133,7 @@ def _nodes(see: Callable[[Any, Any], Sight], across: int, down: int, top: int) -
     corner = ACROSS * (square // across) * columns + ACROSS * (square % across)
     at = corner[:, None] + np.add.outer(np.arange(LATTICE) * columns, np.arange(LATTICE)).ravel()
     o, d, p, n = (np.array(v, np.float64).T for v in (sight.ray.o, sight.ray.d, r.p, r.n))
+    n /= np.maximum(np.linalg.norm(n, axis=1, keepdims=True), 1e-30)  # of Float32, PLANE is finer than that
     every: list[Any] = [
         np.broadcast_to(v, (len(x), *v.shape[1:]))[at]  # what is the same everywhere is there once
         for v in (o, d, p, n, sight.shape.numpy().astype(np.int64), r.active.numpy())

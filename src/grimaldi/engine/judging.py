@@ -21,8 +21,8 @@ AT_BEST = 1 / 16  # what it leaves of it at best: an eighth of a cubic's, less i
 STRAIGHT = 0.5  # what a quadratic leaves of a bilinear function's error, at most
 SIMPSON = 1 / 6, 4 / 6, 1 / 6  # means of quadratics
 OF_PIXEL = 1  # times its share, that the mean over a pixel may be off by, where that is a cell
-IN_PIXEL = 3  # times its share, that M may be off by within a pixel, and in larger cells less by their size: so they
-# add the same to a picture's mean square, and a node pays as much in one as in another
+IN_PIXEL = 3  # times its share, that M may be off by within a pixel; in larger cells less, by their size, so that each
+# cell adds the same to a picture's mean square
 BY_CUBICS = 1.75  # likewise, that cubics and quadratics may be apart in any cell at most
 FAINT = 1.5  # times what |M - M of a ray| may be at nodes, that it may be at one more place
 WITNESS = 0.31, 0.64  # where in a cell M is asked for once more: fringes as wide as nodes are apart look like none
