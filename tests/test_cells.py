@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 import grimaldi
 from grimaldi.engine.cells import cells
-from grimaldi.engine.judging import Shares
+from grimaldi.engine.judging import IN_PIXEL, Shares
 from grimaldi.engine.nodes import LARGEST, ROWS, Nodes
 from grimaldi.engine.tiles import Samples
 
@@ -131,7 +131,8 @@ def test_errors_of_interpolation_count_by_the_light_that_they_change():
         return on_one(0.01 * dr.sin(np.pi * u))
 
     def sizes(most: float, beside: float) -> NDArray[np.uint32]:
-        return cells(dark, 64, 0, 64, 1, Shares(1e-3, most, 0.0, beside)).size.numpy()
+        share = LARGEST / IN_PIXEL * 1e-3  # of which the largest cells have 1e-3
+        return cells(dark, 64, 0, 64, 1, Shares(share, most, 0.0, beside)).size.numpy()
 
     assert sizes(np.inf, 0.0).min() == LARGEST > sizes(np.inf, 1.0).max()
     assert sizes(1e-3, 0.0).max() < LARGEST  # whatever the light
