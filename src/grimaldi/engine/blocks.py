@@ -23,6 +23,7 @@ SIDE = 16  # pixels
 MOST = 3  # blocks of a square
 ROOM = 2.2  # times what the samples of a curved surface differ by
 DEEPEST = 4.0  # times the distance of a sample, that its plane may be seen at within a square
+FACE = 4  # samples of a plane, that have a block of their own: smaller facets are a curved surface together
 PLANE = 1e-4  # what a point may lie off a plane, of the block's radius; and a normal off another
 
 
@@ -153,7 +154,7 @@ def _group(nodes: _Nodes, seed: Integers, candidates: NDArray[np.bool_]) -> _Gro
     off = np.abs(((nodes.p - P[:, None]) * N[:, None]).sum(2))
     along = (nodes.n * N[:, None]).sum(2) > 1 - PLANE**2
     coplanar = candidates & along & (off <= PLANE * size[:, None])
-    flat = ((t > 0) & (t < DEEPEST * t[of][:, None])).all(1) & (coplanar.sum(1) > 1)
+    flat = ((t > 0) & (t < DEEPEST * t[of][:, None])).all(1) & (coplanar.sum(1) >= FACE)
 
     same = candidates & (nodes.shape == nodes.shape[of][:, None])
     away = np.where(same, np.linalg.norm(nodes.p - P[:, None], axis=2), 0).max(1)
