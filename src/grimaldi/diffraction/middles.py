@@ -10,7 +10,7 @@ import numpy as np
 
 from grimaldi.diffraction.corners import Corner, corner, slopes
 from grimaldi.diffraction.edges import cut_off, sounds
-from grimaldi.diffraction.frame import Frame, Frames, constant
+from grimaldi.diffraction.frame import Frame, Frames
 from grimaldi.diffraction.grazing import Near, other_than, worth
 from grimaldi.diffraction.model import LEFT, RIGHT, Blocks
 from grimaldi.diffraction.search import Pairs, Search
@@ -99,16 +99,12 @@ def _hide(opens: Any, tested: Any, search: Search, blocks: Blocks, pairs: Pairs)
 
 def _test(opens: Any, tested: Any, search: Search, blocks: Blocks, pairs: Pairs) -> None:
     """Whether pieces reach the middles of blocks, for the tested pairs, by a ray each."""
-    tab, probe = search.tab, search.probe
     some: Any = dr.compress(tested)
-    if probe is None or len(some) == 0:
+    if len(some) == 0:
         return
     block, piece = (dr.gather(mi.UInt32, v, some) for v in (pairs.block, pairs.piece))
-    whole = tab.piece(piece)
-    p = mi.Point3f(dr.gather(type(blocks.p), blocks.p, block))
-    p += probe.epsilon(p) * dr.gather(type(blocks.n), blocks.n, block)
-    x = mi.Point3f(whole.middle + constant(tab.types.Vector, tab.centre))
-    dr.scatter(opens, probe.reaches(x, whole, p, mi.Bool(True)), some)
+    p, n = (dr.gather(type(v), v, block) for v in (blocks.p, blocks.n))
+    dr.scatter(opens, search.reaches(search.tab.piece(piece), p, n, mi.Bool(True)), some)
     dr.eval(opens)
 
 
@@ -120,7 +116,7 @@ def _is_idle(inner2: Any, start: Any, stop: Any, tolerance: float) -> Any:
 
 @dr.syntax
 def _along(search: Search, fr: Frame, piece: Piece, radius: Any) -> tuple[Any, ...]:
-    """What is in `_Seen` of a piece's segments: `far`, `inner2`, `start` and `stop`."""
+    """What is in `Seen` of a piece's segments: `far`, `inner2`, `start` and `stop`."""
     tab, k, rule = search.tab, search.k, search.rule.corners
     assert rule is not None
     F = tab.types.Float

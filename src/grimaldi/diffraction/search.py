@@ -5,13 +5,16 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import drjit as dr
+import mitsuba
 
-from grimaldi.diffraction.frame import Frames, frame
+from grimaldi.diffraction.frame import Frames, constant, frame
 from grimaldi.diffraction.grazing import Chords
 from grimaldi.diffraction.occlusion import Rays
 from grimaldi.diffraction.segment import Rule
-from grimaldi.diffraction.table import Table
+from grimaldi.diffraction.table import Piece, Table
 from grimaldi.scene.model import Source
+
+mi: Any = mitsuba  # the stubs refuse numbers where arrays are asked for
 
 
 class Search(NamedTuple):
@@ -33,6 +36,13 @@ class Search(NamedTuple):
     def frames(self, p: Any) -> Frames:
         """Of points (Float64), evaluated: once for each, not once for each piece."""
         return Frames.of(frame(self.source, p, self.tab), dr.width(p), self.tab.types)
+
+    def reaches(self, piece: Piece, p: Any, n: Any, active: Any) -> Any:
+        """Whether pieces reach points (Float64) of surfaces, normals n, by a ray from each of these."""
+        assert self.probe is not None
+        x = mi.Point3f(piece.middle + constant(self.tab.types.Vector, self.tab.centre))
+        p = mi.Point3f(p)
+        return self.probe.reaches(x, piece, p + self.probe.epsilon(p) * n, active)
 
 
 class Pairs(NamedTuple):

@@ -10,7 +10,7 @@ import mitsuba
 from grimaldi.diffraction.edges import cut_off, sounds
 from grimaldi.diffraction.fine import Fine, place
 from grimaldi.diffraction.fine import corner as corner_place
-from grimaldi.diffraction.frame import Frames, constant
+from grimaldi.diffraction.frame import Frames
 from grimaldi.diffraction.hierarchy import NONE
 from grimaldi.diffraction.lists import FINELY, INNER, places
 from grimaldi.diffraction.model import ACROSS, LATTICE, LEFT, UP, Blocks
@@ -66,10 +66,11 @@ def verdicts_of(
     members = dr.gather(mi.UInt32, blocks.members, dr.gather(mi.UInt32, pairs.block, pair))
     weak, passes = (dr.gather(mi.Bool, flags, pair) for flags in (weak, passes))
     first = members & dr.select(weak & ((members & COARSE) != 0), mi.UInt32(COARSE), EVERY)
-    bits = _reached(search, blocks, fine, pairs, pair, first)
+    beside = _beside(search, blocks, pairs, pair)
+    bits = _reached(search, blocks, fine, pairs, pair, beside, first)
     told, reached = _between(bits, first)
     bits |= reached & members
-    bits |= _reached(search, blocks, fine, pairs, pair, members & ~first & ~told)
+    bits |= _reached(search, blocks, fine, pairs, pair, beside, members & ~first & ~told)
     filled = _filled(bits, members)
     uniform = (bits == 0) | (bits == members)
     strong = ~weak & (~uniform | passes)
@@ -145,13 +146,21 @@ def _filled(bits: Any, members: Any) -> Any:
     return bits
 
 
-def _reached(search: Search, blocks: Blocks, fine: Fine, pairs: Pairs, pair: Any, asked: Any) -> Any:
+def _reached(
+    search: Search,
+    blocks: Blocks,
+    fine: Fine,
+    pairs: Pairs,
+    pair: Any,
+    beside: tuple[_Beside, _Beside],
+    asked: Any,
+) -> Any:
     """Which of the `asked` corners of cells the pieces of pairs reach; a bit for each.
 
     What the blocks above and to the left share with a block is asked for there, if it is.
     """
     corners = LATTICE * LATTICE
-    above, left = _beside(search, blocks, pairs, pair)
+    above, left = beside
     shared = (above.at(asked) >> LAST_ROW) & FIRST_ROW, (left.at(asked) >> LAST_COLUMN) & FIRST_COLUMN
     own = asked & ~(shared[0] | shared[1])
     dr.eval(own)
@@ -213,10 +222,6 @@ def finely(search: Search, blocks: Blocks, fine: Fine, block: Any, piece: Any, c
 
 def _reaches(search: Search, fine: Fine, at: Any, n: Any, piece: Any) -> Any:
     """Whether pieces reach some of the places, normals n."""
-    tab, probe = search.tab, search.probe
-    assert probe is not None
-    whole = tab.piece(piece)
-    acts = sounds(fine.frames.some(at), whole, tab.types.Vector(n))
-    x = mi.Point3f(whole.middle + constant(tab.types.Vector, tab.centre))
-    p = mi.Point3f(dr.gather(type(fine.p), fine.p, at))
-    return acts & probe.reaches(x, whole, p + probe.epsilon(p) * n, acts)
+    whole = search.tab.piece(piece)
+    acts = sounds(fine.frames.some(at), whole, search.tab.types.Vector(n))
+    return acts & search.reaches(whole, dr.gather(type(fine.p), fine.p, at), n, acts)
