@@ -19,9 +19,8 @@ from grimaldi.bench import scenes
 from grimaldi.diffraction import bundles, fine, listing, middles, verdicts, waves
 from grimaldi.diffraction.arrays import types
 from grimaldi.diffraction.boundary import boundary
-from grimaldi.diffraction.chirps import BETWEEN, FARTHEST, GRID, PLACES, Samples, fit
 from grimaldi.diffraction.frame import Frame
-from grimaldi.diffraction.hierarchy import NONE, layout, least_detour
+from grimaldi.diffraction.hierarchy import layout, least_detour
 from grimaldi.diffraction.lists import FINELY, INNER, List, Parts, listed_sum
 from grimaldi.diffraction.model import LEFT, OUTSIDE, UP, Evaluate, Factor, Options, Receivers
 from grimaldi.diffraction.reach import reach
@@ -228,43 +227,11 @@ def test_chirps_tell_what_the_segments_of_pieces_do(monkeypatch):
     assert np.sqrt((off**2).mean()) < 0.1 * tolerance
 
 
-def test_a_chirp_whose_amplitude_goes_through_zero_is_told():
-    """A e^{iψ} with A and ψ quadratic in the place, its values and ψ at PLACES, but for a part of a turn."""
-
-    def wave(u: Any, v: Any) -> Any:
-        return (0.4 - u + 0.2 * u * v) * np.exp(2j * np.pi * (0.3 + 2.1 * u - 1.3 * v + 0.11 * u * u - 0.06 * v * v))
-
-    place = np.array([*GRID, *BETWEEN]).T
-    single, one = types(double=False), np.ones(PLACES)
-    values = wave(*place).real, wave(*place).imag, 2.05 * place[0] - 1.25 * place[1], one, one, one
-    found = fit(Samples(*(single.Float(v) for v in values)), 1, single)
-    u, v = np.random.default_rng(2).uniform(-1, 1, (2, 200))
-    real, imag = found.chirps.at(dr.zeros(mi.UInt32, 200), mi.Float(u), mi.Float(v))
-    np.testing.assert_allclose(real.numpy() + 1j * imag.numpy(), wave(u, v), atol=1e-5)
-    assert np.sqrt(found.off2.numpy()[0]) < 1e-5
-
-
 def test_bundles_are_fewer_chirps_that_tell_the_same(monkeypatch):
     tolerance = 5e-2
     fewer, every, off = with_and_without(monkeypatch, bundles, "ROUNDS", 0, tolerance)
     assert fewer.everywhere.begin.numpy()[-1] < 0.8 * every.everywhere.begin.numpy()[-1]
     assert 0 < np.sqrt((off**2).mean()) < 0.05 * tolerance
-
-
-@pytest.mark.parametrize("blocks", [[0], [0, 1, 2], [0, 0], [0, 0, 0]])
-def test_a_bundle_holds_each_of_its_waves_once(blocks):
-    """Waves of 1/4 everywhere: those of a block add up, whether one, or several, or none are left to go with it."""
-    n, single = len(blocks), types(double=False)
-    samples = Samples(*(dr.full(single.Float, value, PLACES * n) for value in (0.25, 0, 0, 0, FARTHEST, FARTHEST)))
-    block = mi.UInt32(blocks)
-    allowed = dr.full(single.Float, 1.0, n)
-    found = fit(samples, n, single)
-    chirps, _, chirp = bundles.bundled(found, samples, dr.arange(mi.UInt32, n), block, allowed, max(blocks) + 1)
-    own: Any = dr.compress(chirp != NONE)
-    real, imag = chirps.at(dr.gather(mi.UInt32, chirp, own), mi.Float(0.3), mi.Float(-0.2))
-    np.testing.assert_array_equal(dr.gather(mi.UInt32, block, own).numpy(), np.unique(blocks))
-    np.testing.assert_allclose(real.numpy(), 0.25 * np.bincount(blocks), rtol=1e-5)
-    np.testing.assert_allclose(imag.numpy(), 0, atol=1e-6)
 
 
 def test_lists_are_the_same_in_both_precisions():
