@@ -30,6 +30,7 @@ from grimaldi.outlines.memory import once
 from grimaldi.propagate import Wave, carrier, factor
 from grimaldi.scene.bodies import indices, vertices
 from grimaldi.scene.model import Mesh, Scene, Source
+from grimaldi.syntax import syntax
 
 INTERPOLATED = 0.1, 5e-4, 0.037  # of a strict tolerance, at most; then of a loose one (`_shares`)
 MOST = 0.5  # of the tolerance, to interpolation
@@ -133,7 +134,7 @@ class Light:
         return Reflected(L, real, imag, error)
 
 
-@dr.syntax
+@syntax
 def _unless(m: Factor, holds: Any, beam: Beam, receivers: Receivers) -> Factor:
     """M where it holds, the model's elsewhere."""
     F = mi.Float

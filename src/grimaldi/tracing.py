@@ -10,6 +10,7 @@ import mitsuba as mi
 
 from grimaldi.light import Reflected
 from grimaldi.scene.sources import diffracts
+from grimaldi.syntax import syntax
 from grimaldi.variants import end_kernel, on_cuda
 
 
@@ -24,7 +25,7 @@ class Path(NamedTuple):
     error: list[Any]
 
 
-@dr.syntax
+@syntax
 def trace(
     scene: Any,
     sampler: Any,

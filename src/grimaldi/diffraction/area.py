@@ -28,6 +28,7 @@ from grimaldi.diffraction.surface import Patches, Surface, lit_surface, opening
 from grimaldi.errors import InputError
 from grimaldi.outlines.model import Outline
 from grimaldi.scene.model import Scene, Source
+from grimaldi.syntax import syntax
 
 mi: Any = mitsuba  # the stubs refuse numbers where arrays are asked for
 
@@ -193,7 +194,7 @@ def _nodes(kernel: Kernel, patches: Patches, reached: Reached | None, order: int
     return Nodes(len(records), double.buffer(records))
 
 
-@dr.syntax
+@syntax
 def node_sum(kernel: Kernel, nodes: Nodes, p: Any, n: Any, active: Any) -> tuple[Any, Any]:
     """Σ over nodes of the integrand."""
     double = types(double=True)
@@ -245,7 +246,7 @@ def _stream(p: Any) -> Any:
     return mi.PCG32(initstate=mi.UInt64(a), initseq=mi.UInt64(b))
 
 
-@dr.syntax
+@syntax
 def sample_mean(
     kernel: Kernel, samples: Samples, shares: Any, p: Any, normal: Any, active: Any
 ) -> tuple[Any, Any, Any]:

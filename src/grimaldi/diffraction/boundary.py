@@ -43,6 +43,7 @@ from grimaldi.diffraction.table import Packed, Table, needs_double, packed
 from grimaldi.outlines.model import Outline
 from grimaldi.outlines.silhouettes import silhouettes
 from grimaldi.scene.model import Scene, Source
+from grimaldi.syntax import syntax
 
 mi: Any = mitsuba  # the stubs refuse numbers where arrays are asked for
 
@@ -103,20 +104,18 @@ class _Either(NamedTuple):
 
     @property
     def items(self) -> int:
-        """The number of pieces that there are lists of."""
-        return self.single.items if isinstance(self.single, _Bodies) else 0
+        """As of Float32."""
+        return self.single.items if isinstance(self.single, Grouped) else 0
 
     def among(self, blocks: Blocks) -> Evaluate:
         """By the same lists in both."""
-        if not (isinstance(self.single, _Bodies) and isinstance(self.double, _Bodies)):
-            return self
+        assert isinstance(self.single, _Bodies)
+        assert isinstance(self.double, _Bodies)
         found = self.single.lists(blocks)
-        if found is None:
-            return self
         return self._replace(single=partial(self.single.listed, found), double=partial(self.double.listed, found))
 
 
-@dr.syntax
+@syntax
 def _in_either(single: Evaluate, double: Evaluate, tolerance: float, receivers: Receivers) -> Factor:
     F = types(double=True).Float
     m = single(receivers)
@@ -222,7 +221,7 @@ class _Bodies:
         self.rays = rays(scene, source, outline.sag)
         self.tab = problem.packed.on(precision, AS_ONE * tolerance)
         self.k = self.tab.device(problem.k)
-        self.share = UNASKED * tolerance / self.items
+        self.share = UNASKED * tolerance / int(self.tab.n_pieces[0])
         self.grazing = None if grazed is None else chords(grazed, self.tab.centre, precision)
 
     def __call__(self, receivers: Receivers) -> Factor:
@@ -251,7 +250,10 @@ class _Bodies:
 
     @property
     def items(self) -> int:
-        """The number of pieces."""
+        """The number of pieces; 0 where ends of runs, or what a few rays tell of a block, are not enough for lists."""
+        options = self.problem.options
+        if self.rule.corners is None or options.rim == "smooth" or options.tolerance < LOOSE:
+            return 0
         return int(self.tab.n_pieces[0])
 
     @property
@@ -261,14 +263,10 @@ class _Bodies:
 
     def among(self, blocks: Blocks) -> Evaluate:
         """By lists of what acts on the blocks."""
-        found = self.lists(blocks)
-        return self if found is None else partial(self.listed, found)
+        return partial(self.listed, self.lists(blocks))
 
-    def lists(self, blocks: Blocks) -> Lists | None:
-        """What acts on each block; None where ends of runs, or what a few rays tell of a block, are not enough."""
-        options = self.problem.options
-        if self.rule.corners is None or options.rim == "smooth" or options.tolerance < LOOSE:
-            return None
-        source, tolerance = self.problem.source, options.tolerance
+    def lists(self, blocks: Blocks) -> Lists:
+        """What acts on each block."""
+        source, tolerance = self.problem.source, self.problem.options.tolerance
         search = Search(source, self.tab, self.k, self.rule, tolerance, self.share, self.probe, self.grazing)
         return lists(search, blocks)

@@ -21,6 +21,7 @@ from grimaldi.diffraction.model import Receivers
 from grimaldi.diffraction.occlusion import Rays
 from grimaldi.diffraction.segment import Corners, Line, Rule, Wave, growth, line, path, segment_wave
 from grimaldi.diffraction.table import Piece, Segment, Table
+from grimaldi.syntax import syntax
 
 NEVER = Corners(0.0, 0.0, float("inf"))  # for traces where corners are not asked
 
@@ -101,7 +102,7 @@ class Passed(NamedTuple):
     imag: Any
 
 
-@dr.syntax
+@syntax
 def chain_wave(
     fr: Frame, tab: Table, first: Any, end: Any, k: Any, rule: Rule, passed: Passed | None, smooth: bool, active: Any
 ) -> Chain:
@@ -158,7 +159,7 @@ def chain_wave(
 # ---------------------------------------------------------------- planar holes and masks
 
 
-@dr.syntax
+@syntax
 def planar_sum(fr: Frame, tab: Table, k: Any, rule: Rule, active: Any) -> tuple[Sum, Any, Margins]:
     """The sum over whole planar loops, nothing in between, and n = (1/2π)∮dφ as an exact count."""
     F = tab.types.Float
@@ -178,7 +179,7 @@ def planar_sum(fr: Frame, tab: Table, k: Any, rule: Rule, active: Any) -> tuple[
     return Sum(real, imag, err_real, err_imag, rounding2, F(0)), n, Margins(ray2, receiver2)
 
 
-@dr.syntax
+@syntax
 def planar_count(fr: Frame, tab: Table, active: Any) -> Any:
     """n of `planar_sum` alone."""
     F = tab.types.Float
@@ -308,7 +309,7 @@ def closest(fr: Frame, seg: Segment, ln: Line) -> Any:
     return dr.select(between, ln.eqq * (dr.square(t - ln.td) + ln.w * ln.w), dr.inf)
 
 
-@dr.syntax
+@syntax
 def body_sum(
     fr: Frame,
     tab: Table,
@@ -376,7 +377,7 @@ def body_sum(
     return Sum(real, imag, err_real, err_imag, rounding2, unasked), nearest, Margins(nearest2, receiver2)
 
 
-@dr.syntax
+@syntax
 def _crossings(fr: Frame, tab: Table, bend: Any, n: Any, active: Any) -> Any:
     """Signed count of outlines between the straight way S→P and the bent one S→`bend`→P."""
     F = tab.types.Float
@@ -411,7 +412,7 @@ def _crossings(fr: Frame, tab: Table, bend: Any, n: Any, active: Any) -> Any:
     return count
 
 
-@dr.syntax
+@syntax
 def lit_share(fr: Frame, tab: Table, nearest: Nearest, probe: Rays, receivers: Receivers) -> Any:
     """1 - n: 1 where the ray S→P is free, 0 where it meets a lit surface.
 

@@ -30,6 +30,7 @@ from grimaldi.diffraction.sines import sincos
 from grimaldi.diffraction.table import Piece, cut
 from grimaldi.outlines.model import Outline
 from grimaldi.scene.model import Vector
+from grimaldi.syntax import syntax
 
 FEW = 64  # chords, that take no hierarchy
 FAINT = 0.01  # |M| of a wave that is not worth a second edge
@@ -119,7 +120,7 @@ def passing(way: Frame, chord: Chord, k: float, room: Any = 0) -> Passing:
     return Passing(dr.select(between, (k / np.pi) * d2 * curvature, dr.inf), t, along, d2)
 
 
-@dr.syntax
+@syntax
 def near(fr: Frame, silhouettes: Chords, k: float, receivers: Receivers, room: Any = 0) -> Near:
     """The bodies worth a look at each receiver; on a surface, only what rises above its horizon.
 
@@ -167,7 +168,7 @@ def worth(wave: Any, v2: Any, tolerance: float) -> Any:
     return (wave > FAINT) & (dr.square(wave) > (2 * np.pi**2 * least * least) * v2)
 
 
-@dr.syntax
+@syntax
 def grazed(
     fr: Frame, silhouettes: Chords, piece: Piece, body: Any, visible: Any, k: float, active: Any
 ) -> tuple[Any, Any]:

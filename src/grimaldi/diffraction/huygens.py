@@ -34,6 +34,7 @@ from grimaldi.outlines.divided import divided, joined
 from grimaldi.outlines.model import Integers, Outline, Reals
 from grimaldi.outlines.offset_test import offset_outline
 from grimaldi.scene.model import Scene, Source
+from grimaldi.syntax import syntax
 
 DEFAULT = 3  # sources an edge, as in the report's figure 5
 MOST = 10_000_000  # sources: 1.5 GB of them
@@ -171,7 +172,7 @@ def _spread(fr: Frame, ln: Line, t: Any, k: float, inv_r: Any, inv_s: Any) -> An
     return dr.select(dr.abs(psi) < 0.1, psi * psi / 6, 1 - sincos(psi)[0] / psi)
 
 
-@dr.syntax
+@syntax
 def source_sum(fr: Frame, lamps: Lamps, k: float, probe: Rays | None, receivers: Receivers) -> tuple[Sum, Nearest]:
     """The sum over sources, each where it reaches the receiver."""
     tab = lamps.table

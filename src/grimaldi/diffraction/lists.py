@@ -22,6 +22,7 @@ from grimaldi.diffraction.hierarchy import NONE
 from grimaldi.diffraction.model import Receivers
 from grimaldi.diffraction.segment import Rule, Wave
 from grimaldi.diffraction.table import Piece, Table
+from grimaldi.syntax import syntax
 
 mi: Any = mitsuba  # the stubs refuse numbers where arrays are asked for
 
@@ -149,7 +150,7 @@ class Listed(NamedTuple):
     def weight(self, fr: Frame, piece: Piece) -> Any:
         return 1
 
-    @dr.syntax
+    @syntax
     def chain(
         self, fr: Frame, i: Any, piece: Piece, k: Any, rule: Rule, passed: Passed | None, smooth: bool, active: Any
     ) -> Chain:
@@ -182,7 +183,7 @@ Tell = Callable[[Any, Any, Any], Chain]
 """tell(first, end, active): what neighbouring segments send."""
 
 
-@dr.syntax
+@syntax
 def _of_parts(total: tuple[Any, ...], parts: Parts, tab: Table, tell: Tell, receivers: Receivers, at: Any) -> Any:
     """The total, as in `_with`, with the pieces at some place of lists as far as they reach."""
     F = type(total[0])
@@ -196,7 +197,7 @@ def _of_parts(total: tuple[Any, ...], parts: Parts, tab: Table, tell: Tell, rece
     return total
 
 
-@dr.syntax
+@syntax
 def _of_runs(total: tuple[Any, ...], runs: Runs, tell: Tell, active: Any, at: Any) -> Any:
     """The same with the runs at some place of lists."""
     F = type(total[0])
@@ -207,7 +208,7 @@ def _of_runs(total: tuple[Any, ...], runs: Runs, tell: Tell, active: Any, at: An
     return total
 
 
-@dr.syntax
+@syntax
 def _of_chirps(found: Lists, receivers: Receivers, at: Any) -> tuple[Any, Any]:
     """What is told by chirps, of the receivers' blocks and of their cells at places of lists."""
     u, v = place(receivers)
@@ -243,7 +244,7 @@ def _margins(found: Lists, receivers: Receivers) -> Margins:
     return Margins(dr.square(clear), dr.minimum(dr.minimum(a, b), dr.minimum(c, d)))
 
 
-@dr.syntax
+@syntax
 def _of_ends(fr: Frame, tab: Table, k: Any, ends: List, stop: int, active: Any, at: Any) -> tuple[Any, Any]:
     """What far runs send from where they begin, or less the same where they `stop` (0 or 1), at some place of lists."""
     F = tab.types.Float

@@ -15,6 +15,7 @@ from grimaldi.diffraction.grazing import Near, other_than, worth
 from grimaldi.diffraction.model import LEFT, RIGHT, Blocks
 from grimaldi.diffraction.search import Pairs, Search
 from grimaldi.diffraction.table import Piece
+from grimaldi.syntax import syntax
 
 mi: Any = mitsuba  # the stubs refuse numbers where arrays are asked for
 
@@ -114,7 +115,7 @@ def _is_idle(inner2: Any, start: Any, stop: Any, tolerance: float) -> Any:
     return (inner2 < limit * limit) & (dr.maximum(dr.abs(start), dr.abs(stop)) < limit)
 
 
-@dr.syntax
+@syntax
 def _along(search: Search, fr: Frame, piece: Piece, radius: Any) -> tuple[Any, ...]:
     """What is in `Seen` of a piece's segments: `far`, `inner2`, `start` and `stop`."""
     tab, k, rule = search.tab, search.k, search.rule.corners

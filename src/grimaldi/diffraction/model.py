@@ -119,7 +119,7 @@ class Grouped(Protocol):
 
     @property
     def items(self) -> int:
-        """What of the outlines is looked at for each block."""
+        """How much of the outlines is looked at for each block; 0 where blocks are of no use."""
         ...
 
     def __call__(self, receivers: Receivers) -> Factor: ...

@@ -13,6 +13,7 @@ from grimaldi.diffraction.arrays import on_device
 from grimaldi.diffraction.frame import constant, toward
 from grimaldi.diffraction.table import Piece
 from grimaldi.scene.model import Mesh, Scene, Source, Sphere
+from grimaldi.syntax import syntax
 
 mi: Any = mitsuba  # the stubs refuse numbers where arrays are asked for
 
@@ -44,7 +45,7 @@ class Rays(NamedTuple):
             return self.clear(origin, constant(mi.Point3f, self.source.position), active)
         return ~self.blockers.ray_test(mi.Ray3f(origin, toward(self.source, origin)), active)
 
-    @dr.syntax
+    @syntax
     def reaches(self, x: Any, piece: Piece, p: Any, active: Any) -> Any:
         """Whether the wave from x on an outline piece reaches p.
 

@@ -21,6 +21,7 @@ import numpy as np
 
 from grimaldi.diffraction.frame import Frame
 from grimaldi.diffraction.sines import sincos
+from grimaldi.syntax import syntax
 
 
 class Corners(NamedTuple):
@@ -241,7 +242,7 @@ def _asinh(x: Any) -> Any:
     return dr.copysign(dr.log(m + root), x)
 
 
-@dr.syntax
+@syntax
 def _panels(st: Path, first: Any, middle: Any, last: Any, rule: Rule) -> Any:
     """∫ F e^{iY} dv / cosh v over first..last in v, twice over what lies before `middle`, over F(0)."""
     Float = type(first)
@@ -327,7 +328,7 @@ class Wave(NamedTuple):
         )
 
 
-@dr.syntax
+@syntax
 def segment_wave(frame: Frame, ln: Line, length: Any, k: Any, rule: Rule, active: Any) -> Wave:
     """∫ C e^{ikΔ} dφ over X0 + t e, 0 <= t <= length, and its error; k: wavenumber; all of one precision."""
     Float = type(length)

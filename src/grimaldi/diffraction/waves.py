@@ -15,6 +15,7 @@ from grimaldi.diffraction.hierarchy import NONE
 from grimaldi.diffraction.lists import List, places
 from grimaldi.diffraction.model import Blocks
 from grimaldi.diffraction.search import Pairs, Search
+from grimaldi.syntax import syntax
 
 mi: Any = mitsuba  # the stubs refuse numbers where arrays are asked for
 
@@ -146,7 +147,7 @@ def sums(parts: Any, block: Any, number: int, some: Any = True) -> Any:
     return total
 
 
-@dr.syntax
+@syntax
 def _nearest(samples: Samples, block: Any, number: int) -> tuple[Any, Any]:
     """`clear` and `receiver2` of `Waves`."""
     n = len(block)

@@ -27,13 +27,18 @@ class Recordings:
     listed: tuple[Recording, Recording] = field(default_factory=lambda: (Recording(), Recording()))
 
 
-def ask(film: Squares, factor: Evaluate, recordings: Recordings) -> Ask:
-    """How to ask a model for M at what a camera sees."""
+def ask(film: Squares | None, factor: Evaluate, recordings: Recordings) -> Ask:
+    """How to ask a model for M at what a camera sees; without a film, of each receiver by itself."""
     whole = _replayed(factor, recordings.whole)
-    listed = factor.among(film.blocks) if isinstance(factor, Grouped) else factor
-    if listed is factor:
+    if film is None or pieces(factor) == 0:
         return lambda x, y, receivers: whole(receivers)
-    return partial(_by_blocks, film, _replayed(listed, recordings.listed), whole)
+    assert isinstance(factor, Grouped)
+    return partial(_by_blocks, film, _replayed(factor.among(film.blocks), recordings.listed), whole)
+
+
+def pieces(factor: Evaluate) -> int:
+    """How much a model looks at for each block."""
+    return factor.items if isinstance(factor, Grouped) else 0
 
 
 def _replayed(evaluate: Evaluate, recordings: tuple[Recording, Recording]) -> Evaluate:

@@ -126,7 +126,7 @@ def squares(see: Callable[[Any, Any], Sight], width: int, top: int, rows: int) -
 def _nodes(see: Callable[[Any, Any], Sight], across: int, down: int, top: int) -> _Nodes:
     """What the camera sees at the corners of cells."""
     columns = ACROSS * across + 1
-    y, x = (mi.Float(v.ravel()) for v in np.mgrid[: ACROSS * down + 1, :columns].astype(np.float32) * (SIDE // ACROSS))
+    y, x = (buffer(mi.Float, v) for v in np.mgrid[: ACROSS * down + 1, :columns] * (SIDE // ACROSS))
     sight = see(x, y + top)
     r = sight.receivers
     dr.eval(sight.ray.o, sight.ray.d, r.p, r.n, sight.shape, r.active)

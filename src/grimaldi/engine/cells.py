@@ -97,7 +97,7 @@ class Cells:
 class _Level(NamedTuple):
     """Cells of one size: which of the film's serve, and with what error."""
 
-    size: int
+    size: Any
     serves: Any
     error: Any
     ray: Any
@@ -128,18 +128,19 @@ def cells(evaluate: Evaluate, width: int, top: int, rows: int, finest: int, shar
     levels: list[_Level] = []
     size = LARGEST
     while True:
-        fill(nodes, grid, order, x, y, size, evaluate)
-        found = judged(nodes, grid, x, y, size, finest, shares)
+        of_size = dr.opaque(mi.UInt32, size)  # no kernel contains it: all levels run the same ones
+        fill(nodes, grid, order, x, y, of_size, evaluate)
+        found = judged(nodes, grid, x, y, of_size, finest, shares)
         if size == finest:
-            found = _with_nodes_about(found, nodes, grid, order, x, y, size, evaluate, shares)
+            found = _with_nodes_about(found, nodes, grid, order, x, y, of_size, evaluate, shares)
         if size > 1:
-            found = witnessed(found, nodes, grid, x, y, size, evaluate, shares)
-        levels.append(_level(size, x, y, across * LARGEST // size, down * LARGEST // size, found))
+            found = witnessed(found, nodes, grid, x, y, of_size, evaluate, shares)
+        levels.append(_level(of_size, x, y, across * LARGEST // size, down * LARGEST // size, found))
         left: Any = dr.compress(found.halved)
         if size == finest or len(left) == 0:
             break
         size //= 2
-        x, y = _quarters(dr.gather(mi.UInt32, x, left), dr.gather(mi.UInt32, y, left), size)
+        x, y = _quarters(dr.gather(mi.UInt32, x, left), dr.gather(mi.UInt32, y, left), dr.opaque(mi.UInt32, size))
     return _by_pixel(nodes, grid, levels, across * LARGEST, down * LARGEST)
 
 
@@ -150,7 +151,7 @@ def _with_nodes_about(
     order: tuple[Any, Any],
     x: Any,
     y: Any,
-    size: int,
+    size: Any,
     evaluate: Evaluate,
     shares: Shares,
 ) -> Verdict:
@@ -162,13 +163,13 @@ def _with_nodes_about(
         return found
     x, y = dr.gather(mi.UInt32, x, some), dr.gather(mi.UInt32, y, some)
     fill(nodes, grid, order, x, y, size, evaluate, about=1)
-    for values, again in zip(found, judged(nodes, grid, x, y, size, size, shares), strict=True):
+    for values, again in zip(found, judged(nodes, grid, x, y, size, 1 << grid.shift, shares), strict=True):
         dr.scatter(values, again, some)
     dr.eval(*found)
     return found
 
 
-def _level(size: int, x: Any, y: Any, across: int, down: int, found: Verdict) -> _Level:
+def _level(size: Any, x: Any, y: Any, across: int, down: int, found: Verdict) -> _Level:
     """The cells at pixels (x, y) among all of their size."""
     place = (y // size) * dr.opaque(mi.UInt32, across) + x // size
     count = across * down
@@ -185,7 +186,7 @@ def _level(size: int, x: Any, y: Any, across: int, down: int, found: Verdict) ->
     return level
 
 
-def _quarters(x: Any, y: Any, size: int) -> tuple[Any, Any]:
+def _quarters(x: Any, y: Any, size: Any) -> tuple[Any, Any]:
     """The four cells, `size` pixels across, of each cell at (x, y)."""
     part = dr.arange(mi.UInt32, 4 * len(x))
     of = part >> 2

@@ -16,22 +16,27 @@ NODES = 5  # in a row: a cell's own three, and one before and after
 APART = 0.064  # of a third difference: what a quadratic and a cubic differ by at most, t (1-t) (2-t) / 6
 
 
-def apart(values: Any, shapes: Any, first: Any, steps: tuple[Any, Any], active: Any) -> Any:
-    """How far cubics and quadratics are apart in cells (root mean square); infinite where they leave a lit shape.
+def apart(values: Any, shapes: Any, own: list[Any], shape: Any, first: Any, steps: tuple[Any, Any], active: Any) -> Any:
+    """How far cubics and quadratics are apart in cells (root mean square); infinite where they leave a shape.
 
-    values: packets of M's real and imaginary part and two more; `first`: the node before the cell's own along rows and
-    columns; steps: from node to node along each.
+    values: packets of M's real and imaginary part and two more; own: those of the cells' 3 × 3 nodes, which lie on
+    `shape` where `active`; first: the node before the cell's own along rows and columns; steps: from node to node along
+    each.
     """
-    index = [[first + (n * steps[1] + m * steps[0]) for m in range(NODES)] for n in range(NODES)]
-    own = [[dr.gather(mi.Array4f, values, i, active) for i in row] for row in index]
-    shape = dr.gather(mi.UInt32, shapes, index[0][0], active)
-    same = active & (shape > 0)
-    for row in index:
-        for i in row:
-            same &= dr.gather(mi.UInt32, shapes, i, active) == shape
     inner = range(1, NODES - 1)
+    same, rows = active, []
+    for n in range(NODES):
+        row = []
+        for m in range(NODES):
+            if n in inner and m in inner:
+                row.append(own[3 * (n - 1) + m - 1])
+                continue
+            i = first + (n * steps[1] + m * steps[0])
+            row.append(dr.gather(mi.Array4f, values, i, active))
+            same &= dr.gather(mi.UInt32, shapes, i, active) == shape
+        rows.append(row)
     total, count = mi.Float(0), 0
-    for line in [own[n] for n in inner] + [[row[m] for row in own] for m in inner]:
+    for line in [rows[n] for n in inner] + [[row[m] for row in rows] for m in inner]:
         for a, b, c, d in zip(line, line[1:], line[2:], line[3:], strict=False):
             third = (d - a) - 3 * (c - b)
             total, count = total + dr.fma(third.x, third.x, third.y * third.y), count + 1

@@ -5,7 +5,6 @@ By Runge's comparison: a quadratic through nodes twice as near errs by an eighth
 
 from __future__ import annotations
 
-import math
 from typing import Any, NamedTuple
 
 import drjit as dr
@@ -55,8 +54,9 @@ class Verdict(NamedTuple):
     halved: Any
 
 
-def judged(nodes: Values, grid: Grid, x: Any, y: Any, size: int, finest: int, shares: Shares) -> Verdict:
-    """What the nodes of cells at (x, y) tell of them."""
+def judged(nodes: Values, grid: Grid, x: Any, y: Any, size: Any, finest: int, shares: Shares) -> Verdict:
+    """What the nodes of cells at (x, y) tell of them; with an opaque size one kernel for all."""
+    dr.eval(x, y)
     own = gathered(nodes, grid, x, y, size)
     index = [grid.node(x, y, size, m, n) for n in range(3) for m in range(3)]
     shapes = [dr.gather(mi.UInt32, nodes.shape, i) for i in index]
@@ -76,28 +76,24 @@ def judged(nodes: Values, grid: Grid, x: Any, y: Any, size: int, finest: int, sh
 
     missed, rays = dr.opaque(mi.Float, shares.missed), dr.opaque(mi.Float, shares.rays)
     allowed = dr.opaque(mi.Float, shares.most)
-    ray, mixed = mi.UInt32(0), mi.Float(dr.inf)
-    resolved = (clear > size) | (size == finest)
-    serves = same & (off <= allowed)
-    if size == 1:
-        serves &= (left_of_mean <= OF_PIXEL * missed) & (left <= IN_PIXEL * missed)
-    else:
-        serves &= (left <= IN_PIXEL / size * missed) & (resolved | (least > WIDE))
-    cubic, off_cubic = _by_cubics(nodes, grid, x, y, size, light, shares)
-    cubic &= ~serves & (resolved | (least > WIDE))
-    serves |= cubic
-    off = dr.select(cubic, off_cubic, off)
-    if size == LARGEST:
-        ray = dr.select(same & resolved & (most <= rays), dr.select(own[0].x > 0.5, mi.UInt32(2), 1), 0)
-        serves |= ray > 0
-        cubic &= ray == 0
-        off = dr.select(ray > 0, most, off)
-    within = (IN_PIXEL if finest == 1 else 1) * missed
-    if size == finest:
-        spread = _spread(own, shapes)
-        alike = (spread <= allowed) & (spread * (light + spread) <= within)
-        mixed = dr.select(~same & alike, error + spread, dr.inf)
-    hopeless = same & (left * AT_BEST ** math.log2(size / finest) > within)  # not where M is NaN
+    at_finest = size == dr.opaque(mi.UInt32, finest)
+    resolved = (clear > mi.Float(size)) | at_finest
+    wide = resolved | (least > WIDE)
+    serves = same & (off <= allowed) & (left <= IN_PIXEL / mi.Float(size) * missed)
+    serves &= dr.select(size == 1, left_of_mean <= OF_PIXEL * missed, wide)
+    cubic, off_cubic = _by_cubics(nodes, grid, x, y, size, own, shape, same, light, shares)
+    cubic &= ~serves & wide
+    is_ray = (size == LARGEST) & same & resolved & (most <= rays)
+    ray = dr.select(is_ray, dr.select(own[0].x > 0.5, mi.UInt32(2), 1), 0)
+    off = dr.select(is_ray, most, dr.select(cubic, off_cubic, off))
+    serves |= cubic | is_ray
+    cubic &= ~is_ray
+    within = dr.opaque(mi.Float, (IN_PIXEL if finest == 1 else 1) * shares.missed)
+    spread = _spread(own, shapes)
+    alike = (spread <= allowed) & (spread * (light + spread) <= within)
+    mixed = dr.select(at_finest & ~same & alike, error + spread, dr.inf)
+    halvings = dr.log2(mi.Float(size) / dr.opaque(mi.Float, finest))
+    hopeless = same & (left * dr.power(mi.Float(AT_BEST), halvings) > within)  # not where M is NaN
     halved = ~serves & ~hopeless
     verdict = Verdict(serves, error + off, ray, cubic, mixed, halved)
     dr.eval(*verdict)
@@ -105,7 +101,7 @@ def judged(nodes: Values, grid: Grid, x: Any, y: Any, size: int, finest: int, sh
 
 
 def witnessed(
-    found: Verdict, nodes: Values, grid: Grid, x: Any, y: Any, size: int, evaluate: Evaluate, shares: Shares
+    found: Verdict, nodes: Values, grid: Grid, x: Any, y: Any, size: Any, evaluate: Evaluate, shares: Shares
 ) -> Verdict:
     """The verdict, but for cells in which M is something else off their nodes."""
     some: Any = dr.compress(found.serves)
@@ -114,7 +110,7 @@ def witnessed(
     x, y, ray = (dr.gather(mi.UInt32, values, some) for values in (x, y, found.ray))
     cubic = dr.gather(mi.Bool, found.cubic, some)
     u, v = WITNESS
-    there = evaluate(mi.Float(x) + size * u, grid.top + mi.Float(y) + size * v)
+    there = evaluate(mi.Float(x) + mi.Float(size) * u, grid.top + mi.Float(y) + mi.Float(size) * v)
     m, _ = told(nodes.values, grid, x, y, size, cubic, mi.Float(u), mi.Float(v), mi.Bool(True))
     real, imag = or_ray(m, ray)
     off = dr.sqrt(dr.square(real - mi.Float(there.real)) + dr.square(imag - mi.Float(there.imag)))
@@ -129,13 +125,25 @@ def witnessed(
     return found
 
 
-def _by_cubics(nodes: Values, grid: Grid, x: Any, y: Any, size: int, light: Any, shares: Shares) -> tuple[Any, Any]:
+def _by_cubics(
+    nodes: Values,
+    grid: Grid,
+    x: Any,
+    y: Any,
+    size: Any,
+    own: list[Any],
+    shape: Any,
+    same: Any,
+    light: Any,
+    shares: Shares,
+) -> tuple[Any, Any]:
     """Whether cubics serve cells, and what they may leave of M there."""
-    across, down = grid.steps(size)
-    first = grid.node(x, y, size, 0, 0) - (across + down)
-    off = apart(nodes.values, nodes.shape, first, (across, down), grid.inside(x, y, size))
+    steps = grid.steps(size)
+    first = grid.node(x, y, size, 0, 0) - (steps[0] + steps[1])
+    off = apart(nodes.values, nodes.shape, own, shape, first, steps, same & grid.inside(x, y, size))
     missed, allowed = dr.opaque(mi.Float, shares.missed), dr.opaque(mi.Float, shares.most)
-    return (off <= allowed) & (off * (light + off) <= min(IN_PIXEL / size, BY_CUBICS) * missed), off
+    share = dr.minimum(IN_PIXEL / mi.Float(size), BY_CUBICS)
+    return (off <= allowed) & (off * (light + off) <= share * missed), off
 
 
 def _waves(own: list[Any]) -> tuple[Any, Any, Any]:
@@ -149,7 +157,7 @@ def _waves(own: list[Any]) -> tuple[Any, Any, Any]:
 
 
 def _missed(
-    nodes: Values, grid: Grid, x: Any, y: Any, size: int, own: list[Any], shape: Any, same: Any
+    nodes: Values, grid: Grid, x: Any, y: Any, size: Any, own: list[Any], shape: Any, same: Any
 ) -> tuple[Any, Any]:
     """What quadratics leave of M in cells at most, and of its mean, by what the cell around them predicted."""
     c00, c10, c20, c01, c11, c21, c02, c12, c22 = own
@@ -157,12 +165,11 @@ def _missed(
     bent.append(c11 - 0.25 * (c00 + c20 + c02 + c22))
     off = STRAIGHT * _largest(bent)
     mean = STRAIGHT * _length((bent[0] + bent[1] + bent[2] + bent[3] + 4 * bent[4]) / 9)
-    if size == LARGEST:
-        return off, mean
-    around = x & ~mi.UInt32(2 * size - 1), y & ~mi.UInt32(2 * size - 1)
-    coarse = gathered(nodes, grid, *around, 2 * size)
-    predicted = same & all_on(nodes, grid, *around, 2 * size, shape)
-    a, b = (mi.Float(c - c0) / (2 * size) for c, c0 in zip((x, y), around, strict=True))
+    around = x & ~(2 * size - 1), y & ~(2 * size - 1)
+    predicted = same & (size < LARGEST)
+    coarse = gathered(nodes, grid, *around, 2 * size, predicted)
+    predicted &= all_on(nodes, grid, *around, 2 * size, shape, predicted)
+    a, b = (mi.Float(c - c0) / mi.Float(2 * size) for c, c0 in zip((x, y), around, strict=True))
     columns = [quadratic(a + 0.25 * m) for m in range(3)]
     rows = [quadratic(b + 0.25 * n) for n in range(3)]
     misses = [own[3 * n + m] - summed(coarse, columns[m], rows[n]) for n in range(3) for m in range(3)]

@@ -13,6 +13,7 @@ import mitsuba
 
 from grimaldi.diffraction.model import ACROSS
 from grimaldi.engine.cubics import weights
+from grimaldi.syntax import syntax
 
 mi: Any = mitsuba  # the stubs refuse numbers where arrays are asked for
 
@@ -69,7 +70,7 @@ class Grid(NamedTuple):
         """The index of node (m, n) of 3 × 3 in the cell at pixel (x, y)."""
         return ((2 * y + n * size) >> self.shift) * self.columns + ((2 * x + m * size) >> self.shift)
 
-    def inside(self, x: Any, y: Any, size: int) -> Any:
+    def inside(self, x: Any, y: Any, size: Any) -> Any:
         """Whether there are nodes on all sides of cells that cubics may take."""
         before, after = (x > 0) & (y % ROWS > 0), (x + size < self.pixels) & (y + size < self.rows)
         return before & after & ((y + size) % ROWS > 0)
@@ -93,18 +94,19 @@ class Values(NamedTuple):
 
 
 def fill(
-    nodes: Values, grid: Grid, order: tuple[Any, Any], x: Any, y: Any, size: int, evaluate: Evaluate, about: int = 0
+    nodes: Values, grid: Grid, order: tuple[Any, Any], x: Any, y: Any, size: Any, evaluate: Evaluate, about: int = 0
 ) -> None:
     """Ask for M at the nodes of cells, and at as many about them, that are not there yet.
 
     Neighbours go together: they are quicker so.
     """
     asked = dr.zeros(mi.Bool, len(nodes.there))
+    side, before = dr.opaque(mi.UInt32, 3 + 2 * about), dr.opaque(mi.UInt32, about)
+    index = dr.arange(mi.UInt32, (3 + 2 * about) ** 2 * len(x))  # all nodes of all cells: in one kernel
+    cell, node = index // (side * side), index % (side * side)
     across, down = grid.steps(size)
-    first = grid.node(x, y, size, 0, 0) - about * (across + down)
-    for n in range(3 + 2 * about):
-        for m in range(3 + 2 * about):
-            dr.scatter(asked, mi.Bool(True), first + (n * down + m * across))
+    first = grid.node(dr.gather(mi.UInt32, x, cell), dr.gather(mi.UInt32, y, cell), size, 0, 0)
+    dr.scatter(asked, mi.Bool(True), first + (node % side - before) * across + (node // side - before) * down)
     asked &= ~nodes.there
     left: Any = dr.compress(dr.gather(mi.Bool, asked, order[0], order[1]))
     index = dr.gather(mi.UInt32, order[0], left)
@@ -121,17 +123,18 @@ def fill(
     dr.eval(nodes.values, nodes.error, nodes.shape, nodes.there)
 
 
-def gathered(nodes: Values, grid: Grid, x: Any, y: Any, size: int) -> list[Any]:
+def gathered(nodes: Values, grid: Grid, x: Any, y: Any, size: Any, active: Any = True) -> list[Any]:
     """The values of cells' nodes, row by row."""
-    return [dr.gather(mi.Array4f, nodes.values, grid.node(x, y, size, m, n)) for n in range(3) for m in range(3)]
+    index = [grid.node(x, y, size, m, n) for n in range(3) for m in range(3)]
+    return [dr.gather(mi.Array4f, nodes.values, i, active) for i in index]
 
 
-def all_on(nodes: Values, grid: Grid, x: Any, y: Any, size: int, shape: Any) -> Any:
+def all_on(nodes: Values, grid: Grid, x: Any, y: Any, size: Any, shape: Any, active: Any = True) -> Any:
     """Whether all nodes of cells lie on a shape."""
     same = mi.Bool(True)
     for n in range(3):
         for m in range(3):
-            same &= dr.gather(mi.UInt32, nodes.shape, grid.node(x, y, size, m, n)) == shape
+            same &= dr.gather(mi.UInt32, nodes.shape, grid.node(x, y, size, m, n), active) == shape
     return same
 
 
@@ -154,7 +157,7 @@ def summed(values: list[Any], columns: tuple[Any, Any, Any], rows: tuple[Any, An
     return total
 
 
-@dr.syntax
+@syntax
 def told(values: Any, grid: Grid, x: Any, y: Any, size: Any, cubic: Any, u: Any, v: Any, active: Any) -> Any:
     """What nodes say at places (u, v), 0..1, of cells at pixels (x, y), and the range of their distances."""
     steps = grid.steps(size)

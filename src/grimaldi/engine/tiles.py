@@ -16,8 +16,8 @@ import mitsuba
 import numpy as np
 from numpy.typing import NDArray
 
-from grimaldi.diffraction.model import OUTSIDE, Factor, Grouped, Receivers
-from grimaldi.engine.asking import Ask, ask
+from grimaldi.diffraction.model import OUTSIDE, Factor, Receivers
+from grimaldi.engine.asking import Ask, ask, pieces
 from grimaldi.engine.blocks import Sight, squares
 from grimaldi.engine.cells import Cells, Known, cells
 from grimaldi.engine.nodes import LARGEST, ROWS, Nodes
@@ -91,11 +91,11 @@ def bands(light: Light, sensor: Any, shot: Shot) -> Iterator[Band]:
         return
     finest = 1 if shot.spp >= 8 else 2 if shot.spp >= 2 else 4  # a finer cell asks no less than its pixels would
     row = len(light.beams) * ROWS * shot.width * (2 / finest) ** 2 / NODES
-    items = max((beam.factor.items for beam in light.beams if isinstance(beam.factor, Grouped)), default=0)
+    items = max((pieces(beam.factor) for beam in light.beams), default=0)
     step = ROWS * max(int(1 / max(row, items * shot.width * ROWS / (LARGEST**2 * PAIRS))), 1)
     for top in range(0, shot.height, step):
         rows = min(step, shot.height - top)
-        film = squares(lambda x, y: sight(light, sensor, shot, x, y)[0], shot.width, top, rows)
+        film = squares(lambda x, y: sight(light, sensor, shot, x, y)[0], shot.width, top, rows) if items else None
         asks = tuple(ask(film, beam.factor, beam.recordings) for beam in light.beams)
         found = tuple(
             cells(partial(_nodes, light, a, sensor, shot), shot.width, top, rows, finest, shares)
