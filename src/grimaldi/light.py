@@ -35,6 +35,8 @@ from grimaldi.syntax import syntax
 INTERPOLATED = 0.1, 5e-4, 0.037  # of a strict tolerance, at most; then of a loose one (`_shares`)
 MOST = 0.5  # of the tolerance, to interpolation
 RAYS = 0.08, 0.012  # of the tolerance, and at most: |M - M of a ray|, where pictures show a ray's
+ROUNDINGS = 12  # of Float32, of the largest coordinate: what Mitsuba's points are off by, and paths to them
+PHASE = 0.125  # of the tolerance, that they may be in phase
 
 
 @dataclass(frozen=True)
@@ -88,6 +90,7 @@ class Light:
     shares: tuple[Shares, ...]  # for each beam, what may be left of M over the film; none where M is always asked for
 
     asks: bool  # whether the model does more for M than to trace a ray
+    rounding: float | None  # rad, of U's phase at Mitsuba's own points, where that is within the tolerance
 
     def select(self, names: tuple[str, ...]) -> list[int]:
         """Where the groups called `names` stand in `keys`, at the first wavelength."""
@@ -110,7 +113,9 @@ class Light:
 
         known: M of each beam, and where it holds (None: wherever it is needed); elsewhere the model is asked.
         """
-        p = self.hits.point(ray, si, active)
+        asks = not known or any(holds is not None for _, holds in known)
+        rounding = None if asks else self.rounding
+        p = self.hits.point(ray, si, active) if rounding is None else si.p
         receivers = Receivers(p, n, active)
         context = mi.BSDFContext()
         real, imag, error = ([mi.Float(0)] * len(self.keys) for _ in range(3))
@@ -129,7 +134,8 @@ class Light:
                 dr.fma(weight, u.real, re),
                 dr.fma(weight, u.imag, im),
             )
-            real[k], imag[k], error[k] = real[k] + u.real, imag[k] + u.imag, error[k] + u.error
+            off = u.error if rounding is None else dr.fma(u.free, dr.opaque(mi.Float, rounding), u.error)
+            real[k], imag[k], error[k] = real[k] + u.real, imag[k] + u.imag, error[k] + off
         L = sum((re * re + im * im for re, im in amplitudes), mi.UnpolarizedSpectrum(0))
         return Reflected(L, real, imag, error)
 
@@ -183,7 +189,17 @@ def prepare(scene: Scene, settings: Settings) -> Light:
     beams = tuple(beam(wavelength, source) for wavelength in wavelengths for source in sources)
     interpolates = options.fast and chosen is boundary
     shares = tuple(_shares(beams, beam, options.tolerance) for beam in beams) if interpolates else ()
-    return Light(scene, hits(scene), beams, keys, shares, chosen is not none)
+    rounding = 2 * np.pi / min(wavelengths) * ROUNDINGS * 2.0**-24 * _reach(scene)
+    within = rounding if rounding <= PHASE * options.tolerance else None
+    return Light(scene, hits(scene), beams, keys, shares, chosen is not none, within)
+
+
+def _reach(scene: Scene) -> float:
+    """The largest coordinate of surfaces, sources and cameras."""
+    where = [vertices(surface) for surface in scene.surfaces if surface is not None]
+    where += [source.position for source in scene.sources if source.position is not None]
+    where += [np.array(sensor.world_transform().translation()).T for sensor in scene.mitsuba.sensors()]
+    return max(float(np.abs(x).max()) for x in where)
 
 
 def _shares(beams: Sequence[Beam], beam: Beam, tolerance: float) -> Shares:

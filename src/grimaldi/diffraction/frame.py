@@ -109,8 +109,8 @@ def way(z: Any, d2: Any) -> tuple[Any, Any, Any]:
 
 
 def incident(source: Source, p: Any, k: float, precision: Types) -> tuple[Any, Any, Any]:
-    """U0 at p (Float64) by eq. 1-2: its modulus, cosine and sine of its phase, which is reduced in Float64."""
-    V, F = types(double=True).Vector, precision.Float
+    """U0 at p by eq. 1-2: its modulus, cosine and sine of its phase, which is reduced in the precision of p."""
+    V, F = type(p), precision.Float
     modulus = on_device(F, source.amplitude)
     if source.is_plane:
         assert source.direction is not None
