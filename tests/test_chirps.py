@@ -11,7 +11,7 @@ import pytest
 
 from grimaldi.diffraction import bundles
 from grimaldi.diffraction.arrays import types
-from grimaldi.diffraction.chirps import BETWEEN, FARTHEST, GRID, PLACES, Samples, fit
+from grimaldi.diffraction.chirps import FARTHEST, FLAT, PLACES, Samples, fit
 from grimaldi.diffraction.hierarchy import NONE
 
 mi: Any = mitsuba
@@ -24,12 +24,12 @@ def test_a_chirp_whose_amplitude_goes_through_zero_is_told():
     def wave(u: Any, v: Any) -> Any:
         return (0.4 - u + 0.2 * u * v) * np.exp(2j * np.pi * (0.3 + 2.1 * u - 1.3 * v + 0.11 * u * u - 0.06 * v * v))
 
-    place = np.array([*GRID, *BETWEEN]).T
+    place = np.array(FLAT.places).T
     single, one = types(double=False), np.ones(PLACES)
     values = wave(*place).real, wave(*place).imag, 2.05 * place[0] - 1.25 * place[1], one, one, one
     found = fit(Samples(*(single.Float(v) for v in values)), 1, single)
     u, v = np.random.default_rng(2).uniform(-1, 1, (2, 200))
-    real, imag = found.chirps.at(dr.zeros(mi.UInt32, 200), mi.Float(u), mi.Float(v))
+    real, imag = found.chirps.at(dr.zeros(mi.UInt32, 200), (mi.Float(u), mi.Float(v)))
     np.testing.assert_allclose(real.numpy() + 1j * imag.numpy(), wave(u, v), atol=1e-5)
     assert np.sqrt(found.off2.numpy()[0]) < 1e-5
 
@@ -44,7 +44,7 @@ def test_a_bundle_holds_each_of_its_waves_once(blocks):
     found = fit(samples, n, single)
     chirps, _, chirp = bundles.bundled(found, samples, dr.arange(mi.UInt32, n), block, allowed, max(blocks) + 1)
     own: Any = dr.compress(chirp != NONE)
-    real, imag = chirps.at(dr.gather(mi.UInt32, chirp, own), mi.Float(0.3), mi.Float(-0.2))
+    real, imag = chirps.at(dr.gather(mi.UInt32, chirp, own), (mi.Float(0.3), mi.Float(-0.2)))
     np.testing.assert_array_equal(dr.gather(mi.UInt32, block, own).numpy(), np.unique(blocks))
     np.testing.assert_allclose(real.numpy(), 0.25 * np.bincount(blocks), rtol=1e-5)
     np.testing.assert_allclose(imag.numpy(), 0, atol=1e-6)

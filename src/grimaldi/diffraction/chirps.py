@@ -1,13 +1,14 @@
-"""Waves over a flat block of receivers as chirps: what a piece sends there is A e^{iψ}, A and ψ quadratic in the place.
+"""Waves over a block of receivers as chirps: what a piece sends there is A e^{iψ}, A and ψ quadratic in the place.
 
 k(r + s - R) bends by little over the few pixels of a block, and what a short piece sends besides changes slowly. So a
-wave is asked for at nine places of a block, and told anywhere in it for a sine and a cosine; where these and two
-places between are not told closely enough it is no chirp there, but may be in a quadrant of the block (`waves`).
+wave is asked for at some places of a block, and told anywhere in it for a sine and a cosine; where these and a few
+places between are not told closely enough it is no chirp there, but may be in a quadrant of a flat block (`waves`).
+Places are two numbers on flat blocks, three about curved ones (`solids`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import drjit as dr
@@ -20,26 +21,48 @@ from grimaldi.diffraction.edges import chain_wave
 from grimaldi.diffraction.frame import Frame
 from grimaldi.diffraction.hierarchy import least_detour
 from grimaldi.diffraction.model import ACROSS, Receivers
+from grimaldi.diffraction.search import sums
 from grimaldi.diffraction.segment import Rule
 from grimaldi.diffraction.sines import of_turns
 from grimaldi.diffraction.table import Table
+from grimaldi.outlines.model import Reals
 
 mi: Any = mitsuba  # the stubs refuse numbers where arrays are asked for
 
-SIDE = 3  # places across a block, by which waves are told
-GRID = [(u, v) for v in (-1.0, 0.0, 1.0) for u in (-1.0, 0.0, 1.0)]
-BETWEEN = [(u, 0.5) for u in (-0.5, 0.5)]
-PLACES = len(GRID) + len(BETWEEN)
+Place = Sequence[Any]  # in a block, -1..1 along each axis
+
+
+class Stencil(NamedTuple):
+    """Places of a block that tell waves: terms of quadratics by the `known`, the first, and their errors by all."""
+
+    places: Sequence[tuple[float, ...]]
+    known: int
+    weights: Reals  # (terms, known): of values, in the terms of the quadratic nearest to them
+
+    @staticmethod
+    def of(known: Sequence[tuple[float, ...]], between: Sequence[tuple[float, ...]]) -> Stencil:
+        return Stencil([*known, *between], len(known), np.linalg.pinv(np.array([_powers(place) for place in known])))
+
+
+def _powers(place: Place) -> list[Any]:
+    """The terms of quadratics at a place: 1, u, v, u², uv, v², and likewise of more axes."""
+    return [1.0, *place, *(x * y for i, x in enumerate(place) for y in place[i:])]
+
+
+SIDE = 3  # places across a flat block
+FLAT = Stencil.of(
+    [(u, v) for v in (-1.0, 0.0, 1.0) for u in (-1.0, 0.0, 1.0)],  # along the film's rows and columns
+    [(u, 0.5) for u in (-0.5, 0.5)],
+)
+PLACES = len(FLAT.places)
 QUADRANTS = 4
-PACKETS = 3
+BEATS = 3.0  # turns, by which a piece's ends may be further apart in one place of a block than in another: beats
+# between those where waves are asked for would look like none
 FARTHEST = 1e30  # square of distances, for no distance
 
 
 class Chirps(NamedTuple):
-    """Waves over blocks: real and imaginary part at places u, v of those, -1..1 along the film's rows and columns.
-
-    Three packets for each: the terms of ψ/2π in 1, u, v, u², uv, v², then those of A.
-    """
+    """Waves over blocks. Packets for each: the terms of ψ/2π (`_powers`), then those of A."""
 
     packets: Any
     types: Types
@@ -48,18 +71,31 @@ class Chirps(NamedTuple):
         """Both, one after the other."""
         return Chirps(dr.concat((self.packets, other.packets)), self.types)
 
-    def at(self, i: Any, u: Any, v: Any) -> tuple[Any, Any]:
-        """The wave i."""
-        a, b, c = (dr.gather(self.types.Packet, self.packets, PACKETS * i + j) for j in range(PACKETS))
-        sin, cos = of_turns(_quadratic((*a, b.x, b.y), u, v))
-        amplitude = _quadratic((b.z, b.w, *c), u, v)
+    def at(self, i: Any, place: Place) -> tuple[Any, Any]:
+        """Real and imaginary part of the wave i."""
+        terms = len(_powers(place))
+        count = _packets(terms)
+        rows = (dr.gather(self.types.Packet, self.packets, count * i + j) for j in range(count))
+        numbers = [x for row in rows for x in row]
+        sin, cos = of_turns(_quadratic(numbers[:terms], place))
+        amplitude = _quadratic(numbers[terms:], place)
         return amplitude * cos, amplitude * sin
 
 
-def _quadratic(terms: tuple[Any, ...], u: Any, v: Any) -> Any:
-    """The value of one, by its terms in 1, u, v, u², uv, v²."""
-    one, of_u, of_v, of_uu, of_uv, of_vv = terms
-    return dr.fma(u, dr.fma(u, of_uu, dr.fma(v, of_uv, of_u)), dr.fma(v, dr.fma(v, of_vv, of_v), one))
+def _packets(terms: int) -> int:
+    """How many a chirp of so many terms takes."""
+    return terms // 2  # four numbers of twice the terms
+
+
+def _quadratic(terms: Sequence[Any], place: Place) -> Any:
+    """The value of one, by its terms."""
+    total, linear, square = terms[0], terms[1:], iter(terms[1 + len(place) :])
+    for i, x in enumerate(place):
+        slope = linear[i]
+        for y in place[i:]:
+            slope = dr.fma(y, next(square), slope)
+        total = dr.fma(x, slope, total)
+    return total
 
 
 def quadrant(cell: Any) -> Any:
@@ -103,7 +139,7 @@ def sampled(fr: Frame, tab: Table, k: Any, rule: Rule, piece: Any) -> Samples:
 def place_of(block: Any, i: Any, of: Any | None = None) -> Any:
     """Where the i-th of PLACES of blocks, or `of` one of their quadrants, stands among `fine.Fine`."""
     column, row = (
-        dr.gather(type(i), type(i)([int(ACROSS // 2 * (place[axis] + 1)) for place in (*GRID, *BETWEEN)]), i)
+        dr.gather(type(i), type(i)([int(ACROSS // 2 * (place[axis] + 1)) for place in FLAT.places]), i)
         for axis in (0, 1)
     )
     if of is None:
@@ -112,8 +148,8 @@ def place_of(block: Any, i: Any, of: Any | None = None) -> Any:
 
 
 class Fit(NamedTuple):
-    """Waves as chirps; over PLACES: the mean squares of them and of what chirps leave of them, by how many turns more
-    the ends are apart in one place than in another, and the least squared distance of rays."""
+    """Waves as chirps; over all places: the mean squares of them and of what chirps leave of them, by how many turns
+    more the ends are apart in one place than in another, and the least squared distance of rays."""
 
     chirps: Chirps
     size2: Any
@@ -121,25 +157,30 @@ class Fit(NamedTuple):
     beats: Any
     ray2: Any
 
+    def serves(self, most: Any, beats: float = BEATS) -> Any:
+        """Whether no more is left than `most` (off2)."""
+        return (self.off2 < most) & (self.beats < beats)
 
-def fit(samples: Samples, n: int, types: Types, of: Any | None = None) -> Fit:
-    """n waves, each by PLACES samples, of blocks or `of` some quadrants of theirs (n,); evaluated."""
+
+def fit(samples: Samples, n: int, types: Types, of: Any | None = None, stencil: Stencil = FLAT) -> Fit:
+    """n waves, each by samples at a stencil's places, of blocks or `of` some quadrants of theirs (n,); evaluated."""
     F, index = types.Float, dr.arange(dr.uint32_array_t(types.Float), n)
+    count, terms = len(stencil.places), len(stencil.weights)
 
     def at_places(values: Any) -> list[Any]:
-        return [dr.gather(F, values, PLACES * index + t) for t in range(PLACES)]
+        return [dr.gather(F, values, count * index + t) for t in range(count)]
 
-    turns = (F(0), *_terms(at_places(samples.turns))[1:])
+    turns = [F(0), *_terms(stencil, at_places(samples.turns))[1:]]
     left: list[tuple[Any, Any]] = []
-    for (u, v), re, im in zip((*GRID, *BETWEEN), at_places(samples.real), at_places(samples.imag), strict=True):
-        sin, cos = of_turns(_quadratic(turns, u, v))
+    for place, re, im in zip(stencil.places, at_places(samples.real), at_places(samples.imag), strict=True):
+        sin, cos = of_turns(_quadratic(turns, place))
         left.append((re * cos + im * sin, im * cos - re * sin))
     mean, phases, amplitudes = _polar(left)
-    phase, amplitude = _terms(phases), _terms(amplitudes)
+    phase, amplitude = _terms(stencil, phases), _terms(stencil, amplitudes)
     size2, off2 = F(0), F(0)
-    for (u, v), (re, im) in zip((*GRID, *BETWEEN), left, strict=True):
-        sin, cos = of_turns(mean + _quadratic(phase, u, v))
-        told = _quadratic(amplitude, u, v)
+    for place, (re, im) in zip(stencil.places, left, strict=True):
+        sin, cos = of_turns(mean + _quadratic(phase, place))
+        told = _quadratic(amplitude, place)
         size2 += re * re + im * im
         off2 += dr.square(told * cos - re) + dr.square(told * sin - im)
     low, high, ray2 = F(dr.inf), F(-dr.inf), F(FARTHEST)
@@ -148,14 +189,20 @@ def fit(samples: Samples, n: int, types: Types, of: Any | None = None) -> Fit:
     psi = [a + b for a, b in zip(turns, phase, strict=True)]
     psi[0] += mean
     if of is not None:
-        psi, amplitude = (_widened(terms, of) for terms in (psi, amplitude))
+        psi, amplitude = (_widened(t, of) for t in (psi, amplitude))
     numbers = [psi[0] - dr.round(psi[0]), *psi[1:], *amplitude]
-    packets = dr.zeros(F, 4 * PACKETS * n)
-    for j in range(PACKETS):
-        dr.scatter(packets, types.Packet(*numbers[4 * j : 4 * j + 4]), PACKETS * index + j)
-    found = size2 / PLACES, off2 / PLACES, high - low, ray2
+    packets = dr.zeros(F, 2 * terms * n)
+    for j in range(_packets(terms)):
+        dr.scatter(packets, types.Packet(*numbers[4 * j : 4 * j + 4]), _packets(terms) * index + j)
+    found = size2 / count, off2 / count, high - low, ray2
     dr.eval(packets, *found)
     return Fit(Chirps(packets, types), *found)
+
+
+def allowed(block: Any, most: float, number: int, some: Any = True) -> Any:
+    """`Fit.off2` of each of `some` waves of blocks, that together they leave `most`: as much as the others there."""
+    count = sums(dr.select(mi.Bool(some), mi.UInt32(1), 0), block, number)
+    return most**2 / mi.Float(dr.gather(mi.UInt64, count, block))
 
 
 def _polar(values: list[tuple[Any, Any]]) -> tuple[Any, list[Any], list[Any]]:
@@ -189,13 +236,6 @@ def _widened(terms: Sequence[Any], of: Any) -> tuple[Any, ...]:
     )
 
 
-def _terms(values: list[Any]) -> tuple[Any, ...]:
-    """Of the quadratic nearest to values on the GRID: 1, u, v, uv, u² - 2/3 and v² - 2/3 are orthogonal there."""
-
-    def along(term: Callable[[float, float], float]) -> Any:
-        weights = [term(u, v) for u, v in GRID]
-        return sum(w * x for w, x in zip(weights, values, strict=False) if w) / sum(w * w for w in weights)
-
-    of_uu, of_vv = along(lambda u, v: u * u - 2 / 3), along(lambda u, v: v * v - 2 / 3)
-    one = along(lambda u, v: 1) - 2 / 3 * (of_uu + of_vv)
-    return one, along(lambda u, v: u), along(lambda u, v: v), of_uu, along(lambda u, v: u * v), of_vv
+def _terms(stencil: Stencil, values: list[Any]) -> list[Any]:
+    """Of the quadratic nearest to values at a stencil's known places."""
+    return [sum(w * x for w, x in zip(row, values, strict=False) if abs(w) > 1e-9) for row in stencil.weights.tolist()]

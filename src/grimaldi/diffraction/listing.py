@@ -21,12 +21,12 @@ from grimaldi.diffraction.frame import Frame, Frames
 from grimaldi.diffraction.grazing import Near, near
 from grimaldi.diffraction.hierarchy import NONE, least_detour
 from grimaldi.diffraction.lists import List, Lists, Parts, Runs, places
-from grimaldi.diffraction.middles import CORNER, seen_from_middles
+from grimaldi.diffraction.middles import CORNER, Seen, seen_from_middles
 from grimaldi.diffraction.model import ACROSS, LATTICE, Blocks, Receivers
-from grimaldi.diffraction.search import Pairs, Search
+from grimaldi.diffraction.search import Pairs, Search, sums
 from grimaldi.diffraction.table import Piece, Table
 from grimaldi.diffraction.verdicts import EVERY, Verdicts, finely, verdicts_of
-from grimaldi.diffraction.waves import Waves, sums, waves
+from grimaldi.diffraction.waves import Waves, waves
 
 mi: Any = mitsuba  # the stubs refuse numbers where arrays are asked for
 
@@ -47,18 +47,11 @@ def lists(search: Search, blocks: Blocks) -> Lists:
     beside = _beside(search, blocks, frames)
     seen = seen_from_middles(search, blocks, frames, pairs, beside)
 
-    # where a piece reaches this block but not the next in the same plane, it may not reach all of it
-    states = dr.zeros(mi.UInt32, number * n)
-    dr.scatter(states, dr.select(seen.open, dr.select(seen.idle, mi.UInt32(0), ACTS), HIDDEN), pairs.index)
     curved = dr.gather(mi.Float, blocks.bend, pairs.block) > 0
-    changes = mi.Bool(curved)
-    other_state = dr.select(seen.open, mi.UInt32(HIDDEN), ACTS)
-    for side in blocks.beside:
-        other = dr.gather(mi.UInt32, side, pairs.block) * n + pairs.piece
-        changes |= dr.gather(mi.UInt32, states, other) == other_state
+    changes = curved | _changes(blocks, pairs, seen, n)
     limit = 2 * np.pi * tolerance
     faint = seen.far & (dr.maximum(dr.abs(seen.start), dr.abs(seen.stop)) < UNTESTED * limit)
-    tested = ((curved | changes) & ~faint) | seen.passes
+    tested = (changes & ~faint) | seen.passes
     dropped = seen.open & ~tested & (seen.idle | (seen.far & (seen.inner2 < dr.square(CORNER * limit))))
     kept = seen.open & ~tested & ~dropped
     dr.eval(tested, kept, dropped)
@@ -93,12 +86,17 @@ def lists(search: Search, blocks: Blocks) -> Lists:
     left = sums(dr.ceil(left2 / unit), pairs.block, number)
     dr.eval(begins, stops, first, end, kept)
     runs, everywhere = _in_quadrants(tab, pairs, number, kept, follows, found)
-    asked, asked_chirps, partly, chirped = _in_cells(search, blocks, finer, pairs, verdicts, found, seen.passes)
+    asked, asked_chirps, partly, partly_solids, chirped = _in_cells(
+        search, blocks, finer, pairs, verdicts, found, seen.passes
+    )
     return Lists(
         dr.opaque(mi.UInt32, number),
         asked,
         asked_chirps,
         partly,
+        partly_solids,
+        found.solids,
+        blocks.boxes,
         runs,
         found.chirps,
         chirped,
@@ -110,6 +108,20 @@ def lists(search: Search, blocks: Blocks) -> Lists:
         dr.sqrt(mi.Float(left) * unit) / (2 * np.pi) + found.left,
         beside,
     )
+
+
+def _changes(blocks: Blocks, pairs: Pairs, seen: Seen, n: int) -> Any:
+    """Of which pairs the piece reaches the block but not the next in its plane: it may not reach all of it. Or not the
+    block but the next."""
+    states = dr.zeros(mi.UInt32, dr.width(blocks.p) * n)
+    dr.scatter(states, dr.select(seen.open, dr.select(seen.idle, mi.UInt32(0), ACTS), HIDDEN), pairs.index)
+    changes = mi.Bool(False)
+    other_state = dr.select(seen.open, mi.UInt32(HIDDEN), ACTS)
+    for side in blocks.beside:
+        other = dr.gather(mi.UInt32, side, pairs.block) * n + pairs.piece
+        changes |= dr.gather(mi.UInt32, states, other) == other_state
+    dr.eval(changes)
+    return changes
 
 
 def _of_next(flags: Any) -> Any:
@@ -152,7 +164,7 @@ def _in_quadrants(tab: Table, pairs: Pairs, number: int, kept: Any, follows: Any
 
 def _in_cells(
     search: Search, blocks: Blocks, fine: Fine, pairs: Pairs, verdicts: Verdicts, found: Waves, passes: Any
-) -> tuple[List, Any, Parts, Parts]:
+) -> tuple[List, Any, Parts, Any, Parts]:
     """Those lists of cells that `Lists` has, by the verdicts on pairs."""
     cells, number = ACROSS * ACROSS, dr.width(blocks.p)
     pair = places(verdicts.any & ~found.small)
@@ -171,10 +183,13 @@ def _in_cells(
     place = cell * dr.opaque(mi.UInt32, number) + dr.gather(mi.UInt32, block, entry)
     of = dr.gather(mi.UInt32, pair, entry)
     chirp = dr.gather(mi.UInt32, found.index, QUADRANTS * of + quadrant(cell))
-    by_chirp = dr.select(dr.gather(mi.Bool, passes, of), NONE, chirp)  # what passes silhouettes is told apart by sides
+    curved = dr.gather(mi.Float, blocks.bend, dr.gather(mi.UInt32, block, entry)) > 0
+    by_sides = dr.gather(mi.Bool, passes, of)  # what passes silhouettes is told apart by their sides
+    by_chirp = dr.select(curved | by_sides, NONE, chirp)
     looks = ((dr.gather(mi.UInt32, looked_at, entry) >> cell) & 1) != 0
-    reaches, told = ~asks & (looks | (corners > 0)), chirp != NONE
-    dr.eval(corners, asks, chirp, by_chirp, reaches, told, place, own)
+    reaches, told = ~asks & (looks | (corners > 0)), ~curved & (chirp != NONE)
+    solid = dr.select(curved, chirp, NONE)
+    dr.eval(corners, asks, chirp, by_chirp, reaches, told, solid, place, own)
     some: Any = dr.compress(looks)
     if len(some):
         its_block, its_piece = (dr.gather(mi.UInt32, v, dr.gather(mi.UInt32, entry, some)) for v in (block, piece))
@@ -189,6 +204,7 @@ def _in_cells(
         List.of(asks, place, cells * number, own),
         dr.gather(mi.UInt32, by_chirp, places(asks)),
         parts(reaches & ~told, own),
+        dr.gather(mi.UInt32, solid, places(reaches & ~told)),
         parts(reaches & told, chirp),
     )
 

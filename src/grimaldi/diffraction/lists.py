@@ -19,7 +19,7 @@ from grimaldi.diffraction.edges import Chain, Margins, Nearest, Passed, Sum, cha
 from grimaldi.diffraction.frame import Frame
 from grimaldi.diffraction.grazing import Chords, Near
 from grimaldi.diffraction.hierarchy import NONE
-from grimaldi.diffraction.model import Receivers
+from grimaldi.diffraction.model import Boxes, Receivers
 from grimaldi.diffraction.segment import Rule, Wave
 from grimaldi.diffraction.table import Piece, Table
 from grimaldi.syntax import syntax
@@ -63,6 +63,7 @@ class Runs(NamedTuple):
     last: List
 
 
+BOXED = 1.3  # of half a box, that what is told there holds as far from its middle
 INNER = 3  # places across a cell, and a mark of what is told by these
 FINELY = 1 << INNER * INNER
 
@@ -100,6 +101,9 @@ class Lists(NamedTuple):
     asked: List  # of cells: pieces that each receiver asks for
     asked_chirps: Any  # of each of these, what tells its wave; NONE where its segments do
     partly: Parts  # of cells: pieces that reach it, or a part of it, but not all of the block as far as is known
+    partly_solids: Any  # of each of these, the solid that tells its wave in the block's box; NONE where there is none
+    solids: Chirps
+    boxes: Boxes
     runs: Runs  # of quadrants
     chirps: Chirps
     chirped: Parts  # of cells: those that reach it
@@ -160,7 +164,7 @@ class Listed(NamedTuple):
         whole = chain_wave(fr, self.table, piece.first, piece.end, k, rule, passed, smooth, active & ~told)
         real, imag, *rest = whole.wave
         if told:
-            re, im = self.lists.chirps.at(index, *place(self.receivers))
+            re, im = self.lists.chirps.at(index, place(self.receivers))
             real, imag = type(real)(re), type(imag)(im)
         return whole._replace(wave=Wave(real, imag, *rest))
 
@@ -184,15 +188,23 @@ Tell = Callable[[Any, Any, Any], Chain]
 
 
 @syntax
-def _of_parts(total: tuple[Any, ...], parts: Parts, tab: Table, tell: Tell, receivers: Receivers, at: Any) -> Any:
+def _of_parts(total: tuple[Any, ...], found: Lists, tab: Table, tell: Tell, receivers: Receivers, at: Any) -> Any:
     """The total, as in `_with`, with the pieces at some place of lists as far as they reach."""
     F = type(total[0])
+    parts = found.partly
     i, end = parts.pieces.bounds(at, receivers.active)
+    where = found.boxes.place(receivers.p, receivers.block, i < end)
+    boxed = dr.maximum(dr.maximum(dr.abs(where[0]), dr.abs(where[1])), dr.abs(where[2])) <= BOXED
     while receivers.active & (i < end):
         weight = F(parts.share(i, receivers))
         reached = receivers.active & (weight > 0)
-        if reached:
-            total = _with(total, tell(*tab.range(parts.pieces.item(i)), reached), weight)
+        solid = dr.gather(mi.UInt32, found.partly_solids, i, reached & boxed)
+        told = reached & boxed & (solid != NONE)
+        if told:
+            re, im = found.solids.at(solid, where)
+            total = dr.fma(weight, F(re), total[0]), dr.fma(weight, F(im), total[1]), *total[2:]
+        if reached & ~told:
+            total = _with(total, tell(*tab.range(parts.pieces.item(i)), reached & ~told), weight)
         i += 1
     return total
 
@@ -211,19 +223,18 @@ def _of_runs(total: tuple[Any, ...], runs: Runs, tell: Tell, active: Any, at: An
 @syntax
 def _of_chirps(found: Lists, receivers: Receivers, at: Any) -> tuple[Any, Any]:
     """What is told by chirps, of the receivers' blocks and of their cells at places of lists."""
-    u, v = place(receivers)
-    active = receivers.active
+    at_place, active = place(receivers), receivers.active
     F = found.chirps.types.Float
     real, imag = F(0), F(0)
     i, end = found.everywhere.bounds(found.quadrant(receivers), active)
     while active & (i < end):
-        re, im = found.chirps.at(found.everywhere.item(i), u, v)
+        re, im = found.chirps.at(found.everywhere.item(i), at_place)
         real, imag = real + re, imag + im
         i += 1
     i, end = found.chirped.pieces.bounds(at, active)
     while active & (i < end):
         weight = F(found.chirped.share(i, receivers))
-        re, im = found.chirps.at(found.chirped.pieces.item(i), u, v)
+        re, im = found.chirps.at(found.chirped.pieces.item(i), at_place)
         real, imag = dr.fma(weight, re, real), dr.fma(weight, im, imag)
         i += 1
     return real, imag
@@ -277,7 +288,7 @@ def listed_sum(
         return chain_wave(fr, tab, first, end, k, rule, None, False, active)
 
     total: tuple[Any, ...] = (*sums[:5], F(margins.receiver2), F(nearest.distance2), nearest.segment)
-    total = _of_parts(total, found.partly, tab, tell, receivers, cell)
+    total = _of_parts(total, found, tab, tell, receivers, cell)
     total = _of_runs(total, found.runs, tell, active, found.quadrant(receivers))
     real, imag, err_real, err_imag, rounding2, receiver2, nearest2, segment = total
     for ends, stop in ((found.begins, 0), (found.stops, 1)):

@@ -7,9 +7,12 @@ from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple, Protocol, runtime_checkable
 
 import drjit as dr
+import mitsuba
 
 from grimaldi.outlines.model import Outline
 from grimaldi.scene.model import Scene, Source
+
+mi: Any = mitsuba  # the stubs refuse numbers where arrays are asked for
 
 Precision = Literal["auto", "double"]
 Occlusion = Literal["graded", "binary", "none"]
@@ -67,6 +70,24 @@ LATTICE = ACROSS + 1  # corners of those
 UP, LEFT, RIGHT = 1, 3, 4  # places in `Blocks.beside`
 
 
+class Boxes(NamedTuple):
+    """A box about each block on a curved surface, along three axes across each other: a receiver P lies x of the way
+    from the middle to a side, x = a·(P - middle)."""
+
+    middle: Any  # Float64 (3)
+    axes: Any  # three Float32 packets each, of which the last number is none: a of each axis; 0 of flat blocks
+
+    def axes_of(self, block: Any, active: Any) -> list[Any]:
+        """a of each axis of some."""
+        rows = (dr.gather(mi.Array4f, self.axes, 3 * block + i, active) for i in range(3))
+        return [mi.Vector3f(row.x, row.y, row.z) for row in rows]
+
+    def place(self, p: Any, block: Any, active: Any) -> tuple[Any, ...]:
+        """Where receivers lie in the boxes of their blocks."""
+        d = mi.Vector3f(p - dr.gather(type(self.middle), self.middle, block, active))
+        return tuple(dr.dot(axis, d) for axis in self.axes_of(block, active))
+
+
 class Blocks(NamedTuple):
     """Groups of receivers side by side, as flat Dr.Jit arrays: what changes slowly is found once for each."""
 
@@ -80,6 +101,7 @@ class Blocks(NamedTuple):
     right: Any  # a pixel's way along the film's rows, and along its columns, on the plane; 0 where there is none
     down: Any
     members: Any  # UInt32: a bit for each of those that lies on the same surface, or in its plane
+    boxes: Boxes
     beside: tuple[Any, ...]  # UInt32: blocks around it in the same plane, itself where none is
 
     def of(self, receivers: Receivers, block: Any) -> Any:

@@ -51,3 +51,10 @@ class Pairs(NamedTuple):
     block: Any
     piece: Any
     index: Any  # of the pair among all
+
+
+def sums(parts: Any, block: Any, number: int, some: Any = True) -> Any:
+    """Of some whole numbers in each block, the same in any order."""
+    total = dr.zeros(mi.UInt64, number)
+    dr.scatter_add(total, mi.UInt64(parts), block, some)
+    return total

@@ -9,19 +9,29 @@ import mitsuba
 import numpy as np
 
 from grimaldi.diffraction.bundles import bundled
-from grimaldi.diffraction.chirps import FARTHEST, PLACES, QUADRANTS, Chirps, Fit, Samples, fit, place_of, sampled
+from grimaldi.diffraction.chirps import (
+    FARTHEST,
+    PLACES,
+    QUADRANTS,
+    Chirps,
+    Fit,
+    Samples,
+    allowed,
+    fit,
+    place_of,
+    sampled,
+)
 from grimaldi.diffraction.frame import Frames
 from grimaldi.diffraction.hierarchy import NONE
 from grimaldi.diffraction.lists import List, places
 from grimaldi.diffraction.model import Blocks
-from grimaldi.diffraction.search import Pairs, Search
+from grimaldi.diffraction.search import Pairs, Search, sums
+from grimaldi.diffraction.solids import solids
 from grimaldi.syntax import syntax
 
 mi: Any = mitsuba  # the stubs refuse numbers where arrays are asked for
 
 FITS = 0.08  # of the tolerance: what all chirps of a block may leave of M in the mean, each as much as the others
-BEATS = 3.0  # turns, by which a piece's ends may be further apart in one place of a block than in another: beats
-# between those where waves are asked for would look like none
 AWAY = 0.5  # radii of a block, that rays to it pass by the piece at least: waves beside a ray change within pixels
 OFF = 2.0  # likewise, of a curved one, whose receivers may lie anywhere in a ball
 SMALL = 0.05  # of the tolerance: the sum of |M| of waves that are left out
@@ -33,13 +43,15 @@ class Waves(NamedTuple):
     """What is known of pairs' waves, and how near their pieces are to blocks."""
 
     chirps: Chirps
-    index: Any  # of each pair's chirp in each of QUADRANTS of its block, one pair after the other; NONE if it has none
+    index: Any  # of each pair's chirp in each of QUADRANTS of its block, one pair after the other; NONE if it has none;
+    # of pairs of curved blocks among `solids`
     off2: Any  # of each chirp, as in `Fit`
     inside: Any  # which of the pairs are told by another's chirp
     small: Any  # which of the pairs are left out
     left: Any  # of each block: what is left out of |M|
     clear: Any  # least distance to pieces that may send chirps: of the rays to PLACES of each block
     receiver2: Any  # and of those places themselves, squared
+    solids: Chirps  # about curved blocks
 
 
 def waves(
@@ -64,23 +76,25 @@ def waves(
     dr.scatter(size, mi.Float(dr.sqrt(found.size2)), pair, apart)
     small, left = _small(size / (SMALL * unit), pairs.block, number)
     near = _nearest(samples, block, number)
+    about = solids(search, blocks, pairs, wanted & bends & ~whole & ~small)
 
-    allowed = (FITS * unit) ** 2 / mi.Float(dr.gather(mi.UInt64, sums(mi.UInt32(flat), block, number), block))
+    most = allowed(block, FITS * unit, number, flat)
     told = ~dr.gather(mi.Bool, small, pair)
-    fits = apart & told & (found.off2 < allowed) & (found.beats < BEATS)
+    fits = apart & told & found.serves(most)
     some = places(fits & dr.gather(mi.Bool, whole, pair))
-    of_some, allowed_some = dr.gather(mi.UInt32, block, some), dr.gather(mi.Float, allowed, some)
-    chirps, off2, chirp = bundled(found, samples, some, of_some, allowed_some, number)
+    of_some, most_of_some = dr.gather(mi.UInt32, block, some), dr.gather(mi.Float, most, some)
+    chirps, off2, chirp = bundled(found, samples, some, of_some, most_of_some, number)
     dr.eval(fits, chirp)
     index = dr.full(mi.UInt32, NONE, QUADRANTS * len(wanted))
     for i in range(QUADRANTS):
         dr.scatter(index, chirp, QUADRANTS * pair + i, fits)
+        dr.scatter(index, dr.arange(mi.UInt32, len(about.pair)), QUADRANTS * about.pair + i, about.serves)
     inside = dr.zeros(mi.Bool, len(wanted))
     dr.scatter(inside, mi.Bool(True), pair, fits & (chirp == NONE))
 
     rest = places(flat & told & ~fits)
     least = 0.5 * AWAY * radius
-    of_rest = (dr.gather(type(v), v, rest) for v in (block, piece, least, allowed))
+    of_rest = (dr.gather(type(v), v, rest) for v in (block, piece, least, most))
     parts, entry, of, serves = _in_quadrants(search, at_places, *of_rest)
     entry = dr.gather(mi.UInt32, rest, entry)
     serves &= dr.gather(mi.Bool, flat & told & ~fits, entry)
@@ -89,22 +103,25 @@ def waves(
     off2 = mi.Float(dr.concat((off2, parts.off2)))
     chirps = chirps.and_those_of(parts.chirps)
     dr.eval(index, inside, chirps.packets, off2)
-    return Waves(chirps, index, off2, inside, small, SMALL * search.tolerance * left, *near)
+    ray2 = dr.gather(mi.Float, about.ray2, dr.arange(mi.UInt32, PLACES * number) // PLACES)
+    near = dr.minimum(near[0], dr.sqrt(ray2)), dr.minimum(near[1], ray2)
+    dr.eval(near)
+    return Waves(chirps, index, off2, inside, small, SMALL * search.tolerance * left, *near, about.chirps)
 
 
 def _in_quadrants(
-    search: Search, frames: Frames, block: Any, piece: Any, least: Any, allowed: Any
+    search: Search, frames: Frames, block: Any, piece: Any, least: Any, most: Any
 ) -> tuple[Fit, Any, Any, Any]:
     """Chirps in all quadrants of blocks: of which of these, in which quadrant, and whether they serve.
 
-    least: how far rays pass by the piece; allowed: off2.
+    least: how far rays pass by the piece; most: off2.
     """
     index = dr.arange(mi.UInt32, QUADRANTS * len(block))
     entry, of = index // QUADRANTS, index % QUADRANTS
     block, piece = (dr.gather(mi.UInt32, v, entry) for v in (block, piece))
     found = fit(_samples(search, frames, block, piece, of), len(index), search.tab.types, of)
     serves = found.ray2 > dr.square(dr.gather(mi.Float, least, entry))
-    serves &= (found.off2 < dr.gather(mi.Float, allowed, entry)) & (found.beats < BEATS)
+    serves &= found.serves(dr.gather(mi.Float, most, entry))
     return found, entry, of, serves
 
 
@@ -138,13 +155,6 @@ def _small(size: Any, block: Any, number: int) -> tuple[Any, Any]:
     left = mi.Float(sums(parts, block, number, small)) / PARTS
     dr.eval(small, left)
     return small, left
-
-
-def sums(parts: Any, block: Any, number: int, some: Any = True) -> Any:
-    """Of some whole numbers in each block, the same in any order."""
-    total = dr.zeros(mi.UInt64, number)
-    dr.scatter_add(total, mi.UInt64(parts), block, some)
-    return total
 
 
 @syntax

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from grimaldi.diffraction.arrays import buffer
-from grimaldi.diffraction.model import ACROSS, LATTICE, OUTSIDE, Blocks, Receivers
+from grimaldi.diffraction.model import ACROSS, LATTICE, OUTSIDE, Blocks, Boxes, Receivers
 
 mi: Any = mitsuba  # the stubs refuse numbers where arrays are asked for
 
@@ -22,6 +22,7 @@ Integers = NDArray[np.int64]
 SIDE = 16  # pixels
 MOST = 3  # blocks of a square
 ROOM = 2.2  # times what the samples of a curved surface differ by
+BULK = 0.2  # of the largest distance of a sample, that the box about them goes as far on either side at least
 DEEPEST = 4.0  # times the distance of a sample, that its plane may be seen at within a square
 FACE = 4  # samples of a plane, that have a block of their own: smaller facets are a curved surface together
 PLANE = 1e-4  # what a point may lie off a plane, of the block's radius; and a normal off another
@@ -207,8 +208,26 @@ def _blocks(group: _Group, beside: list[Integers]) -> Blocks:
         mi.Vector3f(right.T.astype(single)),
         mi.Vector3f(down.T.astype(single)),
         _bits(group.member | (group.bend == 0)[:, None]),
+        _boxes(group),
         tuple(buffer(mi.UInt32, b) for b in beside),
     )
+
+
+def _boxes(group: _Group) -> Boxes:
+    """Those of curved blocks hold their samples, along the axes in which these are spread out most and least."""
+    curved = group.there & (group.bend > 0)
+    x, member = group.lattice[curved], group.member[curved][:, :, None]
+    d = x - group.p[curved][:, None]
+    d -= ((d * member).sum(1) / member.sum(1))[:, None]
+    axes = np.linalg.eigh(np.einsum("bsi,bsj->bij", d * member, d))[1].swapaxes(1, 2)
+    along = np.einsum("bsi,bai->bsa", d, axes)
+    low, high = np.where(member, along, np.inf).min(1), np.where(member, along, -np.inf).max(1)
+    least = BULK * group.radius[curved, None] / ROOM
+    half = np.maximum(0.5 * (high - low), least)
+    middle, rows = group.p.copy(), np.zeros((len(group.p), 3, 4))
+    middle[curved] = x[:, 0] - d[:, 0] + np.einsum("ba,bai->bi", 0.5 * (low + high), axes)
+    rows[curved, :, :3] = axes / half[:, :, None]
+    return Boxes(mi.Point3d(middle.T), buffer(mi.Float, rows))
 
 
 def _pixel(group: _Group) -> tuple[Reals, Reals]:
