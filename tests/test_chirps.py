@@ -13,6 +13,7 @@ from grimaldi.diffraction import bundles
 from grimaldi.diffraction.arrays import types
 from grimaldi.diffraction.chirps import FARTHEST, FLAT, PLACES, Samples, fit
 from grimaldi.diffraction.hierarchy import NONE
+from grimaldi.diffraction.solids import SPACE
 
 mi: Any = mitsuba
 mi.set_variant("llvm_ad_rgb")
@@ -32,6 +33,25 @@ def test_a_chirp_whose_amplitude_goes_through_zero_is_told():
     real, imag = found.chirps.at(dr.zeros(mi.UInt32, 200), (mi.Float(u), mi.Float(v)))
     np.testing.assert_allclose(real.numpy() + 1j * imag.numpy(), wave(u, v), atol=1e-5)
     assert np.sqrt(found.off2.numpy()[0]) < 1e-5
+
+
+def test_a_chirp_in_space_is_told_by_the_corners_of_an_icosahedron():
+    """The same with three coordinates, as about curved blocks; what is cubic is seen to be left out."""
+
+    def wave(u: Any, v: Any, w: Any, cubic: float = 0.0) -> Any:
+        turns = 0.2 - 1.7 * u + 0.9 * v + 0.4 * w + 0.05 * u * u - 0.08 * u * v + 0.06 * v * w - 0.03 * w * w
+        return (0.5 + 0.1 * u - 0.2 * v * w + 0.05 * w) * np.exp(2j * np.pi * (turns + cubic * u * v * w))
+
+    u, v, w = place = np.array(SPACE.places).T
+    single, one = types(double=False), np.ones(len(u))
+    for cubic, left in ((0.0, 1e-5), (0.3, 0.02)):
+        values = wave(*place, cubic).real, wave(*place, cubic).imag, -1.65 * u + 0.95 * v + 0.4 * w, one, one, one
+        found = fit(Samples(*(single.Float(x) for x in values)), 1, single, stencil=SPACE)
+        assert (np.sqrt(found.off2.numpy()[0]) < left) == (cubic == 0)
+        if cubic == 0:
+            at = np.random.default_rng(3).uniform(-1, 1, (3, 200))
+            real, imag = found.chirps.at(dr.zeros(mi.UInt32, 200), [mi.Float(x) for x in at])
+            np.testing.assert_allclose(real.numpy() + 1j * imag.numpy(), wave(*at), atol=1e-5)
 
 
 @pytest.mark.parametrize("blocks", [[0], [0, 1, 2], [0, 0], [0, 0, 0]])

@@ -16,11 +16,12 @@ from scipy.interpolate import RegularGridInterpolator
 
 import grimaldi
 from grimaldi.bench import scenes
-from grimaldi.diffraction import bundles, fine, listing, middles, verdicts, waves
+from grimaldi.diffraction import bundles, fine, listing, middles, solids, verdicts, waves
+from grimaldi.diffraction import lists as listed
 from grimaldi.diffraction.arrays import types
 from grimaldi.diffraction.boundary import boundary
 from grimaldi.diffraction.frame import Frame
-from grimaldi.diffraction.hierarchy import layout, least_detour
+from grimaldi.diffraction.hierarchy import NONE, layout, least_detour
 from grimaldi.diffraction.lists import FINELY, INNER, List, Parts, listed_sum
 from grimaldi.diffraction.model import LEFT, OUTSIDE, UP, Evaluate, Factor, Options, Receivers
 from grimaldi.diffraction.reach import reach
@@ -121,9 +122,14 @@ class Floor:
 
     tolerance: float
     occlusion: str
+    radius: float | None = None  # of a ball that the floor is the top of
 
     def __post_init__(self) -> None:
-        self.scene = grimaldi.load(scenes.bodies(12, seed=2, size=64, spp=1))
+        dictionary = scenes.bodies(12, seed=2, size=64, spp=1)
+        if self.radius is not None:
+            ball = {"type": "sphere", "center": [0, 0, scenes.FLOOR - self.radius], "radius": self.radius}
+            dictionary["floor"] = ball | {"bsdf": dictionary["floor"]["bsdf"]}
+        self.scene = grimaldi.load(dictionary)
         settings = Settings(wavelength=scenes.WAVELENGTH, tolerance=self.tolerance, occlusion=self.occlusion)
         self.light = prepare(self.scene, settings)
         self.film = squares(self.sight, 64, 0, 64)
@@ -202,11 +208,11 @@ def test_what_reaches_a_cell_in_part_grows_evenly_between_places(across):
 
 
 def with_and_without(
-    monkeypatch: Any, module: Any, name: str, value: float, tolerance: float
+    monkeypatch: Any, module: Any, name: str, value: float, tolerance: float, *how: Any
 ) -> tuple[Any, Any, Reals]:
     """Lists under fringes wider than blocks, those with a number of a module set anew, and how far their M differs."""
     monkeypatch.setattr(scenes, "WAVELENGTH", 2.0)
-    floor = Floor(tolerance, "none")
+    floor = Floor(tolerance, *(how or ("none",)))
     factor: Any = floor.light.beams[0].factor
     places = np.random.default_rng(1).uniform(0, 64, (2, 2000))
     told, lists = [], []
@@ -225,6 +231,23 @@ def test_chirps_tell_what_the_segments_of_pieces_do(monkeypatch):
     assert segments.everywhere.begin.numpy()[-1] == 0
     assert 0 < off.max() < 0.3 * tolerance
     assert np.sqrt((off**2).mean()) < 0.1 * tolerance
+
+
+def test_chirps_in_space_tell_the_same_on_a_curved_surface(monkeypatch):
+    """Nearly all that reaches its blocks; a receiver outside the box of its block is told by segments."""
+    tolerance = 5e-2
+    told, segments, off = with_and_without(monkeypatch, solids, "FITS", 0.0, tolerance, "binary", 30.0)
+    by_solids = told.partly_solids.numpy() != NONE
+    assert by_solids.mean() > 0.8
+    assert (segments.partly_solids.numpy() == NONE).all()
+    assert 0 < off.max() < 0.3 * tolerance
+    assert np.sqrt((off**2).mean()) < 0.1 * tolerance
+
+    monkeypatch.undo()
+    monkeypatch.setattr(listed, "BOXED", 0.0)
+    outside, _, off = with_and_without(monkeypatch, solids, "FITS", 0.0, tolerance, "binary", 30.0)
+    assert (outside.partly_solids.numpy() != NONE).sum() == by_solids.sum()
+    assert off.max() < 1e-4 * tolerance
 
 
 def test_bundles_are_fewer_chirps_that_tell_the_same(monkeypatch):

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import grimaldi
+from grimaldi import light
 from grimaldi.engine.tiles import Shot, bands, render_tile
 from grimaldi.errors import InputError
 from grimaldi.light import Settings, prepare
@@ -162,6 +163,34 @@ def test_a_tile_equals_the_same_pixels_of_the_whole_bit_for_bit():
     pixels = slice(48 * 13 + 5, 48 * 13 + 5 + 96)
     np.testing.assert_array_equal(tile.picture.T, whole.picture.values.reshape(-1, 3)[pixels])
     np.testing.assert_array_equal(tile.U[0].astype(np.complex64), whole.U.values.reshape(-1)[pixels])
+
+
+@pytest.mark.filterwarnings("ignore::grimaldi.errors.GrimaldiWarning")
+@pytest.mark.parametrize(("wavelength", "rounded"), [(0.02, True), (0.002, False)])
+def test_phases_are_told_by_mitsubas_points_where_the_tolerance_allows(monkeypatch, wavelength, rounded):
+    """U differs by less than that share of the tolerance, which its error holds; the picture does not."""
+    tolerance, scene = 5e-2, room({"type": "wave", "wavelength": wavelength})
+    most = light.PHASE * tolerance
+    own = grimaldi.render(scene, spp=1, tolerance=tolerance)
+    monkeypatch.setattr(light, "PHASE", 0.0)
+    exact = grimaldi.render(scene, spp=1, tolerance=tolerance)
+    off, more = abs(own.U.values - exact.U.values), own.error.values - exact.error.values
+    if not rounded:
+        assert off.max() == more.max() == 0
+        return
+    assert off.max() > 0
+    assert (off <= 1.5 * more).all()  # |M| is up to 1.4
+    assert more.max() < most * abs(exact.U.values).max()
+    np.testing.assert_allclose(own.picture.values, exact.picture.values, rtol=1e-4, atol=1e-6)
+
+
+@pytest.mark.filterwarnings("ignore::grimaldi.errors.GrimaldiWarning")
+def test_errors_beside_the_sky_are_those_of_surfaces():
+    """Nodes of cells that see nothing have none, whatever a model says of them."""
+    data = grimaldi.render(room({"type": "wave", "wavelength": 0.02}), spp=1, tolerance=5e-2)
+    sky = (data.U.values == 0).mean()
+    assert 0 < sky < 1
+    assert 0 < data.error.values.max() < 2 * 5e-2 * abs(data.U.values).max()
 
 
 def test_layers_as_aovs_of_mitsubas_own_render():

@@ -104,9 +104,9 @@ def waves(
     chirps = chirps.and_those_of(parts.chirps)
     dr.eval(index, inside, chirps.packets, off2)
     ray2 = dr.gather(mi.Float, about.ray2, dr.arange(mi.UInt32, PLACES * number) // PLACES)
-    near = dr.minimum(near[0], dr.sqrt(ray2)), dr.minimum(near[1], ray2)
-    dr.eval(near)
-    return Waves(chirps, index, off2, inside, small, SMALL * search.tolerance * left, *near, about.chirps)
+    clear, receiver2 = dr.minimum(near[0], dr.sqrt(ray2)), dr.minimum(near[1], ray2)
+    dr.eval(clear, receiver2)
+    return Waves(chirps, index, off2, inside, small, SMALL * search.tolerance * left, clear, receiver2, about.chirps)
 
 
 def _in_quadrants(

@@ -64,7 +64,7 @@ def judged(nodes: Values, grid: Grid, x: Any, y: Any, size: Any, finest: int, sh
     same = shape > 0
     for i, s, c in zip(index, shapes, own, strict=True):
         same &= s == shape
-        error = dr.maximum(error, dr.gather(mi.Float, nodes.error, i))
+        error = dr.maximum(error, dr.select(s > 0, dr.gather(mi.Float, nodes.error, i), 0))
         clear = dr.minimum(clear, c.w)
     least, most, modulus = _waves(own)
     off, mean = _missed(nodes, grid, x, y, size, own, shape, same)
