@@ -42,10 +42,10 @@ def test_a_chirp_in_space_is_told_by_the_corners_of_an_icosahedron():
         turns = 0.2 - 1.7 * u + 0.9 * v + 0.4 * w + 0.05 * u * u - 0.08 * u * v + 0.06 * v * w - 0.03 * w * w
         return (0.5 + 0.1 * u - 0.2 * v * w + 0.05 * w) * np.exp(2j * np.pi * (turns + cubic * u * v * w))
 
-    u, v, w = place = np.array(SPACE.places).T
+    u, v, w = np.array(SPACE.places).T
     single, one = types(double=False), np.ones(len(u))
     for cubic, left in ((0.0, 1e-5), (0.3, 0.02)):
-        values = wave(*place, cubic).real, wave(*place, cubic).imag, -1.65 * u + 0.95 * v + 0.4 * w, one, one, one
+        values = wave(u, v, w, cubic).real, wave(u, v, w, cubic).imag, -1.65 * u + 0.95 * v + 0.4 * w, one, one, one
         found = fit(Samples(*(single.Float(x) for x in values)), 1, single, stencil=SPACE)
         assert (np.sqrt(found.off2.numpy()[0]) < left) == (cubic == 0)
         if cubic == 0:

@@ -208,11 +208,17 @@ def test_what_reaches_a_cell_in_part_grows_evenly_between_places(across):
 
 
 def with_and_without(
-    monkeypatch: Any, module: Any, name: str, value: float, tolerance: float, *how: Any
+    monkeypatch: Any,
+    module: Any,
+    name: str,
+    value: float,
+    tolerance: float,
+    occlusion: str = "none",
+    radius: float | None = None,
 ) -> tuple[Any, Any, Reals]:
     """Lists under fringes wider than blocks, those with a number of a module set anew, and how far their M differs."""
     monkeypatch.setattr(scenes, "WAVELENGTH", 2.0)
-    floor = Floor(tolerance, *(how or ("none",)))
+    floor = Floor(tolerance, occlusion, radius)
     factor: Any = floor.light.beams[0].factor
     places = np.random.default_rng(1).uniform(0, 64, (2, 2000))
     told, lists = [], []
