@@ -214,7 +214,10 @@ def _blocks(group: _Group, beside: list[Integers]) -> Blocks:
 
 
 def _boxes(group: _Group) -> Boxes:
-    """Those of curved blocks hold their samples, along the axes in which these are spread out most and least."""
+    """Those of curved blocks hold their samples, along the axes in which these are spread out most and least.
+
+    A single sample that parallel rays see has a block, but no box.
+    """
     curved = group.there & (group.bend > 0)
     x, member = group.lattice[curved], group.member[curved][:, :, None]
     d = x - group.p[curved][:, None]
@@ -226,7 +229,7 @@ def _boxes(group: _Group) -> Boxes:
     half = np.maximum(0.5 * (high - low), least)
     middle, rows = group.p.copy(), np.zeros((len(group.p), 3, 4))
     middle[curved] = x[:, 0] - d[:, 0] + np.einsum("ba,bai->bi", 0.5 * (low + high), axes)
-    rows[curved, :, :3] = axes / half[:, :, None]
+    rows[curved, :, :3] = axes * np.divide(1, half, out=np.zeros_like(half), where=half > 0)[:, :, None]
     return Boxes(mi.Point3d(middle.T), buffer(mi.Float, rows))
 
 

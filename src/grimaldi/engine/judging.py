@@ -54,20 +54,32 @@ class Verdict(NamedTuple):
     halved: Any
 
 
+class _Own(NamedTuple):
+    """Cells at pixels (x, y), what their own 3 × 3 nodes say, and which of them lie on one lit shape."""
+
+    x: Any
+    y: Any
+    size: Any
+    values: list[Any]
+    shape: Any
+    same: Any
+
+
 def judged(nodes: Values, grid: Grid, x: Any, y: Any, size: Any, finest: int, shares: Shares) -> Verdict:
     """What the nodes of cells at (x, y) tell of them; with an opaque size one kernel for all."""
     dr.eval(x, y)
-    own = gathered(nodes, grid, x, y, size)
+    values = gathered(nodes, grid, x, y, size)
     index = [grid.node(x, y, size, m, n) for n in range(3) for m in range(3)]
     shapes = [dr.gather(mi.UInt32, nodes.shape, i) for i in index]
     shape, error, clear = shapes[0], mi.Float(0), mi.Float(dr.inf)
     same = shape > 0
-    for i, s, c in zip(index, shapes, own, strict=True):
+    for i, s, c in zip(index, shapes, values, strict=True):
         same &= s == shape
         error = dr.maximum(error, dr.select(s > 0, dr.gather(mi.Float, nodes.error, i), 0))
         clear = dr.minimum(clear, c.w)
-    least, most, modulus = _waves(own)
-    off, mean = _missed(nodes, grid, x, y, size, own, shape, same)
+    own = _Own(x, y, size, values, shape, same)
+    least, most, modulus = _waves(values)
+    off, mean = _missed(nodes, grid, own)
     # fringes that are finer than nodes are no better told by twice as many
     doubt = dr.select(most > 0, dr.clip(off / (HALVED**2 * most), 1, 1 / HALVED), 1)
     off, mean = off * doubt, mean * doubt
@@ -81,15 +93,15 @@ def judged(nodes: Values, grid: Grid, x: Any, y: Any, size: Any, finest: int, sh
     wide = resolved | (least > WIDE)
     serves = same & (off <= allowed) & (left <= IN_PIXEL / mi.Float(size) * missed)
     serves &= dr.select(size == 1, left_of_mean <= OF_PIXEL * missed, wide)
-    cubic, off_cubic = _by_cubics(nodes, grid, x, y, size, own, shape, same, light, shares)
+    cubic, off_cubic = _by_cubics(nodes, grid, own, light, shares)
     cubic &= ~serves & wide
     is_ray = (size == LARGEST) & same & resolved & (most <= rays)
-    ray = dr.select(is_ray, dr.select(own[0].x > 0.5, mi.UInt32(2), 1), 0)
+    ray = dr.select(is_ray, dr.select(values[0].x > 0.5, mi.UInt32(2), 1), 0)
     off = dr.select(is_ray, most, dr.select(cubic, off_cubic, off))
     serves |= cubic | is_ray
     cubic &= ~is_ray
     within = dr.opaque(mi.Float, (IN_PIXEL if finest == 1 else 1) * shares.missed)
-    spread = _spread(own, shapes)
+    spread = _spread(values, shapes)
     alike = (spread <= allowed) & (spread * (light + spread) <= within)
     mixed = dr.select(at_finest & ~same & alike, error + spread, dr.inf)
     halvings = dr.log2(mi.Float(size) / dr.opaque(mi.Float, finest))
@@ -125,24 +137,14 @@ def witnessed(
     return found
 
 
-def _by_cubics(
-    nodes: Values,
-    grid: Grid,
-    x: Any,
-    y: Any,
-    size: Any,
-    own: list[Any],
-    shape: Any,
-    same: Any,
-    light: Any,
-    shares: Shares,
-) -> tuple[Any, Any]:
+def _by_cubics(nodes: Values, grid: Grid, own: _Own, light: Any, shares: Shares) -> tuple[Any, Any]:
     """Whether cubics serve cells, and what they may leave of M there."""
-    steps = grid.steps(size)
-    first = grid.node(x, y, size, 0, 0) - (steps[0] + steps[1])
-    off = apart(nodes.values, nodes.shape, own, shape, first, steps, same & grid.inside(x, y, size))
+    steps = grid.steps(own.size)
+    first = grid.node(own.x, own.y, own.size, 0, 0) - (steps[0] + steps[1])
+    inside = own.same & grid.inside(own.x, own.y, own.size)
+    off = apart(nodes.values, nodes.shape, own.values, own.shape, first, steps, inside)
     missed, allowed = dr.opaque(mi.Float, shares.missed), dr.opaque(mi.Float, shares.most)
-    share = dr.minimum(IN_PIXEL / mi.Float(size), BY_CUBICS)
+    share = dr.minimum(IN_PIXEL / mi.Float(own.size), BY_CUBICS)
     return (off <= allowed) & (off * (light + off) <= share * missed), off
 
 
@@ -156,23 +158,22 @@ def _waves(own: list[Any]) -> tuple[Any, Any, Any]:
     return dr.sqrt(least), dr.sqrt(dr.minimum(of_lit, of_dark)), dr.sqrt(of_dark)
 
 
-def _missed(
-    nodes: Values, grid: Grid, x: Any, y: Any, size: Any, own: list[Any], shape: Any, same: Any
-) -> tuple[Any, Any]:
+def _missed(nodes: Values, grid: Grid, own: _Own) -> tuple[Any, Any]:
     """What quadratics leave of M in cells at most, and of its mean, by what the cell around them predicted."""
-    c00, c10, c20, c01, c11, c21, c02, c12, c22 = own
+    c00, c10, c20, c01, c11, c21, c02, c12, c22 = own.values
     bent = [c10 - 0.5 * (c00 + c20), c01 - 0.5 * (c00 + c02), c21 - 0.5 * (c20 + c22), c12 - 0.5 * (c02 + c22)]
     bent.append(c11 - 0.25 * (c00 + c20 + c02 + c22))
     off = STRAIGHT * _largest(bent)
     mean = STRAIGHT * _length((bent[0] + bent[1] + bent[2] + bent[3] + 4 * bent[4]) / 9)
-    around = x & ~(2 * size - 1), y & ~(2 * size - 1)
-    predicted = same & (size < LARGEST)
-    coarse = gathered(nodes, grid, *around, 2 * size, predicted)
-    predicted &= all_on(nodes, grid, *around, 2 * size, shape, predicted)
-    a, b = (mi.Float(c - c0) / mi.Float(2 * size) for c, c0 in zip((x, y), around, strict=True))
+    size = 2 * own.size
+    around = own.x & ~(size - 1), own.y & ~(size - 1)
+    predicted = own.same & (own.size < LARGEST)
+    coarse = gathered(nodes, grid, *around, size, predicted)
+    predicted &= all_on(nodes, grid, *around, size, own.shape, predicted)
+    a, b = (mi.Float(c - c0) / mi.Float(size) for c, c0 in zip((own.x, own.y), around, strict=True))
     columns = [quadratic(a + 0.25 * m) for m in range(3)]
     rows = [quadratic(b + 0.25 * n) for n in range(3)]
-    misses = [own[3 * n + m] - summed(coarse, columns[m], rows[n]) for n in range(3) for m in range(3)]
+    misses = [own.values[3 * n + m] - summed(coarse, columns[m], rows[n]) for n in range(3) for m in range(3)]
     return (
         dr.select(predicted, HALVED * _largest(misses), off),
         dr.select(predicted, HALVED * _length(summed(misses, SIMPSON, SIMPSON)), mean),
