@@ -25,9 +25,11 @@ def separated(sources: tuple[Source, ...]) -> tuple[Source, ...]:
 
 def intensity(U: NDArray[np.complex128]) -> NDArray[np.float64]:
     """Σ_λ Σ_group |U|² over the first two axes of U (wavelength, group, …)."""
-    result = np.empty(U.shape[2:])
-    fields, each = U.reshape(*U.shape[:2], -1), result.ravel()
+    result = np.zeros(U.shape[2:])
+    fields, each = U.reshape(U.shape[0] * U.shape[1], -1), result.ravel()
     for some in parts(len(each)):
-        u = fields[:, :, some]
-        each[some] = (u.real**2 + u.imag**2).sum(axis=(0, 1))
+        total = each[some]
+        for u in fields[:, some]:
+            total += np.square(u.real)
+            total += np.square(u.imag)
     return result

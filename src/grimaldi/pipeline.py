@@ -14,6 +14,8 @@ from grimaldi.options import checked_options, describe
 if TYPE_CHECKING:
     import xarray as xr
 
+Summed = dict[tuple[int, ...], NDArray[Any]]  # numbers of all points, by wavelength or by that and group
+
 
 def field(
     scene: Any,
@@ -94,25 +96,24 @@ def field(
     sources = loaded.sources if interference else separated(loaded.sources)
 
     names = groups(sources)
-    fields: dict[tuple[int, int], NDArray[np.complex128]] = {}
-    error = np.zeros((len(wavelengths), len(names), len(p)))
-    free = np.zeros((len(wavelengths), len(p)))
+    fields: Summed = {}
+    errors: Summed = {}
+    frees: Summed = {}
     misses = Misses(options.tolerance)
     with progress(len(wavelengths) * len(sources) * len(p), "field") as advance:
         for i, length in enumerate(wavelengths):
             for source in sources:
                 of = i, names.index(source.group)
                 for part in propagate_all(loaded, source, factor, 2 * np.pi / length, options, p):
-                    fields[of] = _plus(fields.get(of), part.which, part.U, len(p))
-                    error[*of, part.which] += part.error
-                    free[i, part.which] += part.free
+                    for sums, place, values in (fields, of, part.U), (errors, of, part.error), (frees, (i,), part.free):
+                        sums[place] = _plus(sums.get(place), part.which, values, len(p))
                     misses.add(source, p[part.which], part.error, part.free)
                     advance(len(part.U))
-    each = [fields[of] if of in fields else np.zeros(len(p), complex) for of in np.ndindex(error.shape[:2])]
-    U = (each[0] if len(each) == 1 else np.stack(each)).reshape(error.shape)
+    each = (len(wavelengths), len(names))
+    U, error = _stacked(fields, each, len(p), complex), _stacked(errors, each, len(p), float)
     if diffraction == "boundary":
         misses.warn(loaded)
-        warn_of_faint_light(U, free, options.tolerance)
+        warn_of_faint_light(U, _stacked(frees, each[:1], len(p), float), options.tolerance)
     data = {
         "U": (("wavelength", "group", "point"), U),
         "intensity": ("point", intensity(U)),
@@ -132,6 +133,12 @@ def _plus(total: NDArray[Any] | None, which: Any, values: NDArray[Any], n: int) 
         total = np.zeros(n, values.dtype)
     total[which] += values
     return total
+
+
+def _stacked(sums: Summed, shape: tuple[int, ...], n: int, kind: type) -> NDArray[Any]:
+    """The sums of n points each, at the places of an array of a shape; zeros where there are none."""
+    each = [sums[place] if place in sums else np.zeros(n, kind) for place in np.ndindex(shape)]
+    return (each[0] if len(each) == 1 else np.stack(each)).reshape(*shape, n)
 
 
 def checked_points(points: ArrayLike) -> NDArray[np.float64]:
