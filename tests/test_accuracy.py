@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import warnings
+
 import mitsuba as mi
 import numpy as np
 import pytest
 
 import grimaldi
+from grimaldi.accuracy import warn_of_faint_light
 from grimaldi.errors import GrimaldiWarning
 
 SQUARE = np.array([[-1.0, -1], [1, -1], [1, 1], [-1, 1]])
@@ -58,3 +61,14 @@ def test_faint_light_names_the_tolerance_to_ask_for():
 def test_ordinary_shadows_say_nothing():
     points = np.array([[x, 0.0, 500] for x in np.linspace(-100, 100, 41)])
     grimaldi.field(behind(30), points, wavelength=1.0)
+
+
+@pytest.mark.parametrize(("dark", "counted"), [(0.3, 0), (0.45, 0), (0.55, 110_000), (1.0, 200_000)])
+def test_of_many_points_some_tell_whether_most_are_faint(dark, counted):
+    """And all of them are counted only where that may be."""
+    count = 200_000
+    U = np.where(np.arange(count) < round(dark * count), 1e-6 + 0j, 1.0)[None, None]
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        warn_of_faint_light(U, np.ones((1, count)), 1e-3)
+    assert [f"at {counted} of 200000 points" in str(w.message) for w in told] == [True] * (counted > 0)
