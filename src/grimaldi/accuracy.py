@@ -65,11 +65,6 @@ def _nearest(scene: Scene, seen: Outline, p: Vector) -> str:
     return f"the edge of {name!r} from ({') to ('.join(ends)})"
 
 
-def _faint(U: NDArray[np.complex128], free: Reals, tolerance: float) -> NDArray[np.bool_]:
-    """Where |U| has no digits (wavelength, point)."""
-    return np.abs(U).sum(axis=1) < FEW * tolerance * free  # and so light > 0
-
-
 def warn_of_faint_light(U: NDArray[np.complex128], free: Reals, tolerance: float) -> None:
     """GrimaldiWarning where at most points |U| is below a few tolerances of the light without obstacles.
 
@@ -78,12 +73,13 @@ def warn_of_faint_light(U: NDArray[np.complex128], free: Reals, tolerance: float
     if not free.size:
         return
     every = max(free.shape[1] // SAMPLES, 1) | 1  # odd: no row of a lattice has the same ones as the next
-    if _faint(U[:, :, ::every], free[:, ::every], tolerance).mean() <= SURELY:
+    if (np.abs(U[:, :, ::every]).sum(axis=1) < FEW * tolerance * free[:, ::every]).mean() <= SURELY:
         return
-    faint = _faint(U, free, tolerance)
+    size = np.abs(U).sum(axis=1)
+    faint = size < FEW * tolerance * free  # and so light > 0
     if faint.mean() <= 0.5:
         return
-    typical = float(np.median(np.abs(U).sum(axis=1)[faint] / free[faint]))
+    typical = float(np.median(size[faint] / free[faint]))
     finer = max(10.0 ** np.floor(np.log10(1e-2 * max(typical, 1e-2 * tolerance))), 1e-12)
     warnings.warn(
         f"the light is below {FEW * tolerance:g} of what it is without obstacles at {faint.sum()} of {faint.size} "

@@ -33,18 +33,17 @@ Place = Sequence[Any]  # in a block, -1..1 along each axis
 
 
 class Stencil(NamedTuple):
-    """Places of a block that tell waves: terms of quadratics by the `known`, the first, and their errors by all."""
+    """Places of a block that tell waves: terms of quadratics by the known, the first, and their errors by all."""
 
     places: Sequence[tuple[float, ...]]
-    known: int
     weights: Reals  # (terms, known): of values, in the terms of the quadratic nearest to them
 
     @staticmethod
     def of(known: Sequence[tuple[float, ...]], between: Sequence[tuple[float, ...]]) -> Stencil:
-        return Stencil([*known, *between], len(known), np.linalg.pinv(np.array([_powers(place) for place in known])))
+        return Stencil([*known, *between], np.linalg.pinv(np.array([_powers(place) for place in known])))
 
 
-def _powers(place: Place) -> list[Any]:
+def _powers(place: tuple[float, ...]) -> list[float]:
     """The terms of quadratics at a place: 1, u, v, u², uv, v², and likewise of more axes."""
     return [1.0, *place, *(x * y for i, x in enumerate(place) for y in place[i:])]
 
@@ -73,7 +72,7 @@ class Chirps(NamedTuple):
 
     def at(self, i: Any, place: Place) -> tuple[Any, Any]:
         """Real and imaginary part of the wave i."""
-        terms = len(_powers(place))
+        terms = (len(place) + 1) * (len(place) + 2) // 2
         count = _packets(terms)
         rows = (dr.gather(self.types.Packet, self.packets, count * i + j) for j in range(count))
         numbers = [x for row in rows for x in row]

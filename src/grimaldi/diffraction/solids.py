@@ -19,8 +19,8 @@ from grimaldi.diffraction.search import Pairs, Search
 mi: Any = mitsuba  # the stubs refuse numbers where arrays are asked for
 
 GOLDEN = 0.5 * (1 + 5**0.5)
-CORNERS = [(0.0, a, b * GOLDEN) for a in (-1, 1) for b in (-1, 1)]  # of an icosahedron, as far apart as they can be
-CORNERS = [corner[i:] + corner[:i] for corner in CORNERS for i in range(3)]
+ON_AXES = [(0.0, a, b * GOLDEN) for a in (-1, 1) for b in (-1, 1)]
+CORNERS = [corner[i:] + corner[:i] for corner in ON_AXES for i in range(3)]  # of an icosahedron, all as far apart
 BEATS = 6.0  # as of flat blocks, for more places
 WITHIN = 0.55  # along each axis: where waves are compared once more
 FITS = 0.16  # of the tolerance: what all chirps of a block may leave of M in the mean, each as much as the others

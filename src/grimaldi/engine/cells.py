@@ -127,8 +127,8 @@ def cells(evaluate: Evaluate, width: int, top: int, rows: int, finest: int, shar
     x, y = (index % across) * LARGEST, (index // across) * LARGEST
     levels: list[_Level] = []
     size = LARGEST
+    of_size = dr.opaque(mi.UInt32, size)  # no kernel contains it: all levels run the same ones
     while True:
-        of_size = dr.opaque(mi.UInt32, size)  # no kernel contains it: all levels run the same ones
         fill(nodes, grid, order, x, y, of_size, evaluate)
         found = judged(nodes, grid, x, y, of_size, finest, shares)
         if size == finest:
@@ -140,7 +140,8 @@ def cells(evaluate: Evaluate, width: int, top: int, rows: int, finest: int, shar
         if size == finest or len(left) == 0:
             break
         size //= 2
-        x, y = _quarters(dr.gather(mi.UInt32, x, left), dr.gather(mi.UInt32, y, left), dr.opaque(mi.UInt32, size))
+        of_size = dr.opaque(mi.UInt32, size)
+        x, y = _quarters(dr.gather(mi.UInt32, x, left), dr.gather(mi.UInt32, y, left), of_size)
     return _by_pixel(nodes, grid, levels, across * LARGEST, down * LARGEST)
 
 
