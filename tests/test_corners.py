@@ -20,7 +20,7 @@ mitsuba.set_variant("llvm_ad_rgb")
 
 def ways(rng: np.random.Generator, n: int, plane: bool) -> tuple[Any, Any, Any, Any, Any]:
     """Rays along z through the origin at k = 1, and segments from X0 to X1 beside them, in Fresnel widths and more."""
-    F, V, _ = types(double=True)
+    F, V, *_ = types(double=True)
     z1, z2 = 10 ** rng.uniform(0, 6, (2, n))
     width = np.sqrt(z2 if plane else z1 * z2 / (z1 + z2))
     q, angle = width * 10 ** rng.uniform(-2, 2, n), rng.uniform(0, 2 * np.pi, n)

@@ -1,16 +1,15 @@
-"""Fast ways against the slow literal ones: hierarchies and lists for sums, recordings for models."""
+"""Fast ways against the slow literal ones: hierarchies, and lists of what acts on blocks."""
 
 from __future__ import annotations
 
-import subprocess
-import sys
-from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from dataclasses import replace
+from typing import Any
 
 import drjit as dr
 import mitsuba
 import numpy as np
 import pytest
+from floor import Floor
 from numpy.typing import NDArray
 from scipy.interpolate import RegularGridInterpolator
 
@@ -22,13 +21,10 @@ from grimaldi.diffraction.arrays import types
 from grimaldi.diffraction.boundary import boundary
 from grimaldi.diffraction.frame import Frame
 from grimaldi.diffraction.hierarchy import NONE, layout, least_detour
-from grimaldi.diffraction.lists import FINELY, INNER, List, Parts, listed_sum
-from grimaldi.diffraction.model import LEFT, OUTSIDE, UP, Evaluate, Factor, Options, Receivers
+from grimaldi.diffraction.lists import FINELY, INNER, List, Parts
+from grimaldi.diffraction.model import LEFT, OUTSIDE, UP, Options, Receivers
 from grimaldi.diffraction.reach import reach
-from grimaldi.engine.asking import Recordings, ask
-from grimaldi.engine.blocks import Sight, Squares, squares
-from grimaldi.engine.frozen import frozen
-from grimaldi.engine.tiles import Shot, sight
+from grimaldi.engine.blocks import Sight, squares
 from grimaldi.light import Settings, prepare
 
 mi: Any = mitsuba
@@ -55,7 +51,7 @@ def test_a_node_holds_what_is_inside_and_leads_past_it():
 
 def test_no_point_of_a_sphere_has_a_smaller_detour_than_its_bound():
     rng = np.random.default_rng(1)
-    F, V, _ = types(double=True)
+    F, V, *_ = types(double=True)
     n = 20_000
     S, P = rng.normal(size=(2, n, 3)) * 10
     R = np.linalg.norm(P - S, axis=1)
@@ -113,40 +109,17 @@ def test_what_lies_far_from_the_rays_is_left_out_within_the_tolerance(crowd):
     assert 0 < off.max() < options.tolerance
 
 
+def test_a_field_is_summed_once(crowd):
+    """One kernel for all that is told of the points."""
+    scene, points = crowd
+    with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
+        dr.kernel_history_clear()
+        grimaldi.field(scene, points[:333], wavelength=scenes.WAVELENGTH, tolerance=2e-2)
+        kernels = dr.kernel_history([dr.KernelType.JIT])
+    assert sum(kernel["size"] == 333 for kernel in kernels) == 1
+
+
 # ---------------------------------------------------------------- blocks of receivers
-
-
-@dataclass
-class Floor:
-    """A floor under twelve bodies as a camera sees it, M there by all pieces and by lists of blocks."""
-
-    tolerance: float
-    occlusion: str
-    radius: float | None = None  # of a ball that the floor is the top of
-
-    def __post_init__(self) -> None:
-        dictionary = scenes.bodies(12, seed=2, size=64, spp=1)
-        if self.radius is not None:
-            ball = {"type": "sphere", "center": [0, 0, scenes.FLOOR - self.radius], "radius": self.radius}
-            dictionary["floor"] = ball | {"bsdf": dictionary["floor"]["bsdf"]}
-        self.scene = grimaldi.load(dictionary)
-        settings = Settings(wavelength=scenes.WAVELENGTH, tolerance=self.tolerance, occlusion=self.occlusion)
-        self.light = prepare(self.scene, settings)
-        self.film = squares(self.sight, 64, 0, 64)
-
-    def sight(self, x: Any, y: Any) -> Sight:
-        return sight(self.light, self.scene.mitsuba.sensors()[0], Shot(64, 64, 1, 0, 2, 5, False), x, y)[0]
-
-    def both(self, film: Squares, x: Reals, y: Reals) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
-        """M by the blocks of `film`, and by all pieces, at places of it."""
-        x, y = (mi.Float(v.astype(np.float32)) for v in (x, y))
-        receivers = self.sight(x, y).receivers
-        factor = self.light.beams[0].factor
-        assert receivers.active.numpy().all()
-        return tuple(
-            m.real.numpy() + 1j * m.imag.numpy()
-            for m in (ask(film, factor, Recordings())(x, y, receivers), factor(receivers))
-        )
 
 
 @pytest.mark.parametrize("occlusion", ["none", "graded"])
@@ -224,7 +197,7 @@ def with_and_without(
     told, lists = [], []
     for _ in range(2):
         told.append(floor.both(floor.film, *places)[0])
-        lists.append(factor.single.lists(floor.film.blocks))
+        lists.append(factor.single.known(floor.film.blocks))
         monkeypatch.setattr(module, name, value)
     return lists[0], lists[1], abs(told[0] - told[1])
 
@@ -297,7 +270,7 @@ def test_corners_that_blocks_share_are_asked_for_once(monkeypatch):
     floor = Floor(5e-2, "graded")
     factor: Any = floor.light.beams[0].factor
     for _ in range(2):
-        lists.append(factor.single.lists(floor.film.blocks).partly)
+        lists.append(factor.single.known(floor.film.blocks).partly)
         rays.append(0)
         monkeypatch.setattr(verdicts, "FIRST_ROW", 0)
         monkeypatch.setattr(verdicts, "FIRST_COLUMN", 0)
@@ -328,7 +301,7 @@ def test_blocks_between_others_are_told_what_a_ray_tells(monkeypatch):
     monkeypatch.setattr(listing, "seen_from_middles", kept)
     floor = Floor(5e-2, "graded")
     factor: Any = floor.light.beams[0].factor
-    factor.single.lists(floor.film.blocks)
+    factor.single.known(floor.film.blocks)
     told = seen(*asked[0]).open.numpy()
     tested = middles._unhindered(*asked[0])
     search, blocks, _, pairs, _ = asked[0]
@@ -353,111 +326,3 @@ def test_a_square_has_a_block_for_each_of_three_surfaces():
     height = receivers.p.z.numpy()
     assert [len(np.unique(block[height == z])) for z in (0, 1, 2)] == [1, 1, 1]
     assert len(np.unique(block)) == 3
-
-
-# ---------------------------------------------------------------- models traced and recorded once
-
-
-def test_a_field_is_summed_once(crowd):
-    """One kernel for all that is told of the points."""
-    scene, points = crowd
-    with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
-        dr.kernel_history_clear()
-        grimaldi.field(scene, points[:333], wavelength=scenes.WAVELENGTH, tolerance=2e-2)
-        kernels = dr.kernel_history([dr.KernelType.JIT])
-    assert sum(kernel["size"] == 333 for kernel in kernels) == 1
-
-
-def test_a_recorded_model_tells_what_the_model_tells_wherever_it_is_asked():
-    """For any number of receivers, and of another light with other arrays."""
-    for tolerance in (2e-2, 1e-3):
-        floor = Floor(tolerance, "graded")
-        model = floor.light.beams[0].factor
-        recorded = frozen(model)
-        for n in (300, 7, 1, 2000):
-            x, y = (mi.Float(v.astype(np.float32)) for v in np.random.default_rng(n).uniform(0, 64, (2, n)))
-            receivers = floor.sight(x, y).receivers
-            for own, plain in zip(recorded(receivers), model(receivers), strict=True):
-                np.testing.assert_allclose(own.numpy(), mi.Float64(plain).numpy(), rtol=0, atol=1e-6)
-
-
-def test_another_picture_in_the_same_light_records_nothing_of_the_model(monkeypatch):
-    """And where the film has another size, lists have other arrays: what was recorded tells the same as anew."""
-    loaded = grimaldi.load(scenes.bodies(12, seed=2, size=64, spp=1))
-    settings: dict[str, Any] = {"wavelength": scenes.WAVELENGTH, "tolerance": 2e-2}
-    traced, seen = [], []
-    monkeypatch.setattr("grimaldi.diffraction.boundary.listed_sum", lambda *a: traced.append(0) or listed_sum(*a))
-    for size in ((64, 64), (64, 64), (80, 80), (96, 48)):
-        traced.clear()
-        again = grimaldi.render(loaded, size=size, **settings)
-        seen.append(len(traced))
-        anew = grimaldi.render(replace(loaded), size=size, **settings)
-        np.testing.assert_array_equal(again.U.values, anew.U.values)
-    assert seen[0] > 0
-    assert seen[1] == 0
-
-
-class Pair(NamedTuple):
-    """A model of two precisions."""
-
-    single: Evaluate
-    double: Evaluate
-    tolerance: float
-
-    def __call__(self, receivers: Receivers) -> Factor:
-        raise AssertionError("each of its parts is asked by itself")
-
-
-@pytest.mark.parametrize("above", [0, 1, 5, 800])
-def test_the_finer_part_of_a_model_is_asked_where_the_other_errs(above):
-    """Of a few receivers, which are filled up, and of many."""
-
-    def tells(real: float, error: float) -> Evaluate:
-        return lambda at: Factor(real + 0 * at.p.x, 0 * at.p.x, error * at.p.x, 1 * at.p.y)
-
-    x = dr.arange(mi.Float64, 1000)
-    tolerance = 999.5 - above
-    point = Receivers(mi.Point3d(x, 2 * x, 0), mi.Vector3f(0, 0, 1), x >= 0)
-    told = ask(None, Pair(tells(1, 1), tells(2, 0.5), tolerance), Recordings())(None, None, point)  # pyright: ignore
-    errs = x.numpy() > tolerance
-    assert errs.sum() == above
-    np.testing.assert_array_equal(told.real.numpy(), np.where(errs, 2, 1))
-    np.testing.assert_array_equal(told.error.numpy(), np.where(errs, 0.5, 1) * x.numpy())
-    np.testing.assert_array_equal(told.clearance.numpy(), 2 * x.numpy())
-
-
-def test_a_model_that_hides_an_array_is_refused_not_recorded():
-    """What is not found would stay as it was when its kernel was recorded."""
-    hidden = {"array": dr.opaque(mi.Float, 2.0)}  # a dict is not among what models are made of
-
-    def model(receivers: Receivers) -> Factor:
-        return Factor(hidden["array"] * mi.Float(receivers.p.x), mi.Float(0), mi.Float(0), mi.Float(0))
-
-    point = Receivers(mi.Point3d(1, 2, 3), mi.Vector3f(0, 0, 1), mi.Bool(True))
-    with pytest.raises(RuntimeError):
-        frozen(model)(point)
-
-
-GARBAGE = """
-import gc
-import numpy as np
-import grimaldi
-from grimaldi.diffraction.arrays import types
-from grimaldi.diffraction.boundary import _Bodies
-
-listed = _Bodies.listed
-def littering(self, *given):
-    for _ in range(300):
-        ring = [types(double=False).buffer(np.arange(1000.0))]
-        ring.append(ring)
-    return listed(self, *given)
-_Bodies.listed = littering
-gc.set_threshold(5)
-grimaldi.render("creature", wavelength=4.0, size=(16, 16), spp=8, tolerance=0.1)
-"""
-
-
-def test_what_python_collects_does_not_end_a_recording():
-    """Dr.Jit ends the process where NumPy's memory is given back while it records."""
-    done = subprocess.run([sys.executable, "-c", GARBAGE], capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr

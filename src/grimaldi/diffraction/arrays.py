@@ -28,6 +28,7 @@ class Types(NamedTuple):
     Float: Any
     Vector: Any
     Packet: Any  # four floats of a record, read at once
+    phases: Types | None = None  # of what phases are told by, if not these
 
     def buffer(self, values: NDArray[Any]) -> Any:
         """Numbers as one flat device buffer."""
@@ -77,3 +78,8 @@ def types(double: bool) -> Types:
     if double:
         return Types(ad.Float64, ad.Array3f64, ad.Array4f64)
     return Types(ad.Float, ad.Array3f, ad.Array4f)
+
+
+def mixed() -> Types:
+    """Float32 arrays, but Float64 ones for phases."""
+    return types(double=False)._replace(phases=types(double=True))

@@ -1,7 +1,7 @@
 """The boundary diffraction wave: Kirchhoff's integral as a line integral along the outlines (THEORY eq. 4-6).
 
 Maggi 1888, Rubinowicz 1917, Miyamoto & Wolf 1962; non-singular after A. Barnett, JATIS 7(2) 021211. A segment's
-wave is `segment.segment_wave`, the sums over outlines are in `edges`.
+wave is `segment.segment_wave`, that of neighbours `chains.chain_wave`; the sums over outlines are in `edges`.
 """
 
 from __future__ import annotations
@@ -15,7 +15,8 @@ import mitsuba
 import numpy as np
 
 from grimaldi.diffraction import none
-from grimaldi.diffraction.arrays import Types, types
+from grimaldi.diffraction.arrays import Types, mixed, types
+from grimaldi.diffraction.chains import chain_wave, exact
 from grimaldi.diffraction.curves import curve_error
 from grimaldi.diffraction.edges import (
     Everywhere,
@@ -24,7 +25,6 @@ from grimaldi.diffraction.edges import (
     Sum,
     Walk,
     body_sum,
-    chain_wave,
     lit_share,
     planar_sum,
     sounds,
@@ -34,12 +34,13 @@ from grimaldi.diffraction.grazing import Near, chords, near
 from grimaldi.diffraction.hierarchy import least_detour
 from grimaldi.diffraction.listing import lists
 from grimaldi.diffraction.lists import Listed, Lists, listed_sum
+from grimaldi.diffraction.marks import Marks, marks
 from grimaldi.diffraction.model import OUTSIDE, Blocks, Evaluate, Factor, Grouped, Options, Receivers
 from grimaldi.diffraction.occlusion import Rays, rays
 from grimaldi.diffraction.screen import beyond
 from grimaldi.diffraction.search import Search
 from grimaldi.diffraction.segment import Rule
-from grimaldi.diffraction.table import Packed, Table, needs_double, packed
+from grimaldi.diffraction.table import Packed, Table, may_be_single, needs_double, packed
 from grimaldi.outlines.model import Outline
 from grimaldi.outlines.silhouettes import silhouettes
 from grimaldi.scene.model import Scene, Source
@@ -49,6 +50,7 @@ mi: Any = mitsuba  # the stubs refuse numbers where arrays are asked for
 
 AS_ONE = 4.0  # rad at a tolerance of 1: half of what a run of pieces subtends that is tested by one ray X→P
 LOOSE = 5e-3  # tolerance from which on blocks have lists: thin shadows that they miss are steps in M of some percent
+MARKED = 300  # pieces from which on marks of faint ones pay
 BESIDE = 1e-2  # what rounding shifts an edge by over the way to it, up to which a corner there makes no difference
 UNASKED = 0.3  # of the tolerance: what all pieces whose X→P goes untested may add to M, each the same
 
@@ -69,12 +71,19 @@ class Problem(NamedTuple):
         rule = Rule.of(self.options.tolerance)
         return rule._replace(share=rule.share + curve_error(self.scene, self.outline, self.k))
 
+    @property
+    def listed(self) -> bool:
+        """Whether ends of runs, and what a few rays tell of a block, are enough for lists."""
+        options = self.options
+        enough = options.rim != "smooth" and options.tolerance >= LOOSE
+        return enough and self.rule().corners is not None
+
 
 def boundary(scene: Scene, source: Source, outline: Outline, k: float, options: Options) -> Evaluate:
     """The `boundary` model for one source: M by eq. 4 behind holes, by eq. 5 past bodies and masks.
 
     Where Float32 sums may serve, they are done first; receivers whose estimated error is above the tolerance, as
-    beside an edge, are done again in Float64.
+    beside an edge, are done again in Float64. Where Float32 is too coarse for phases alone, these are Float64.
 
     Raises InputError in variants without vectorised arrays.
     """
@@ -86,10 +95,11 @@ def boundary(scene: Scene, source: Source, outline: Outline, k: float, options: 
     grazed = silhouettes(scene, source) if graded else None
     problem = Problem(scene, source, outline, k, options, packed(outline, source), grazed)
     of_kind = _planar if scene.screen else _bodies
-    double = of_kind(problem, types(double=True))
-    if needs_double(outline, k, options):
-        return double
-    return _Either(of_kind(problem, types(double=False)), double, options.tolerance)
+    if not needs_double(outline, k, options):
+        single, double = (of_kind(problem, types(double)) for double in (False, True))
+        return _Either(single, double, options.tolerance)
+    phases_alone = may_be_single(options) and not scene.screen and not problem.listed
+    return of_kind(problem, mixed() if phases_alone else types(double=True))
 
 
 class _Either(NamedTuple):
@@ -107,12 +117,17 @@ class _Either(NamedTuple):
         """As of Float32."""
         return self.single.items if isinstance(self.single, Grouped) else 0
 
+    @property
+    def inside_only(self) -> bool:
+        """As of Float32."""
+        return isinstance(self.single, Grouped) and self.single.inside_only
+
     def among(self, blocks: Blocks) -> Evaluate:
-        """By the same lists in both."""
+        """Both by what Float32 tells of the blocks."""
         assert isinstance(self.single, _Bodies)
         assert isinstance(self.double, _Bodies)
-        found = self.single.lists(blocks)
-        return self._replace(single=partial(self.single.listed, found), double=partial(self.double.listed, found))
+        found = self.single.known(blocks)
+        return self._replace(single=self.single.by(found), double=self.double.by(found))
 
 
 @syntax
@@ -145,10 +160,11 @@ def _rounding(tab: Table, fr: Frame, k: float, margins: Margins) -> Any:
     the way to it.
     """
     F = tab.types.Float
-    shift = dr.epsilon(F) * (10 * fr.lever + tab.device(tab.reach))
+    of_edges = (tab.types.phases or tab.types).Float
+    shift = dr.epsilon(of_edges) * (10 * fr.lever + tab.device(tab.reach))
     near = dr.rsqrt(dr.maximum(margins.receiver2, 1e-30)) + dr.rcp(tab.device(tab.from_source))
     error = 4 * dr.epsilon(F) + 2 * shift * (dr.sqrt(near * tab.device(k / (2 * np.pi))) + near / np.pi)
-    if dr.itemsize_v(F) == 8:
+    if dr.itemsize_v(of_edges) == 8:
         return error
     corner = dr.minimum(shift * dr.rsqrt(margins.ray2), 1)
     return dr.select(corner > BESIDE, dr.maximum(error, corner), error)
@@ -219,18 +235,25 @@ class _Bodies:
         self.problem = problem
         self.rule = problem.rule()
         self.rays = rays(scene, source, outline.sag)
-        self.tab = problem.packed.on(precision, AS_ONE * tolerance)
+        self.tab = problem.packed.on(precision, AS_ONE * tolerance, problem.k)
         self.k = self.tab.device(problem.k)
         self.share = UNASKED * tolerance / int(self.tab.n_pieces[0])
         self.grazing = None if grazed is None else chords(grazed, self.tab.centre, precision)
 
     def __call__(self, receivers: Receivers) -> Factor:
         """By all pieces."""
+        return self._by_all(Everywhere(self.tab, self.share), receivers)
+
+    def _by_all(self, walk: Everywhere, receivers: Receivers) -> Factor:
         fr = frame(self.problem.source, receivers.p, self.tab)
         beside = None if self.grazing is None else near(fr, self.grazing, self.k, receivers)
-        return self._factor(fr, receivers, self._sum(fr, Everywhere(self.tab, self.share), beside, receivers))
+        return self._factor(fr, receivers, self._sum(fr, walk, beside, receivers))
 
-    def listed(self, found: Lists, receivers: Receivers) -> Factor:
+    def _by_marks(self, found: Marks, receivers: Receivers) -> Factor:
+        """By all pieces, faint ones as far as the marks of the receivers' blocks say."""
+        return self._by_all(Everywhere(self.tab, self.share, found.at(receivers)), receivers)
+
+    def _by_lists(self, found: Lists, receivers: Receivers) -> Factor:
         """By the lists of the receivers' blocks."""
         receivers = receivers._replace(active=receivers.active & (receivers.block != OUTSIDE))
         fr = frame(self.problem.source, receivers.p, self.tab)
@@ -245,16 +268,21 @@ class _Bodies:
 
     def _factor(self, fr: Frame, receivers: Receivers, found: tuple[Sum, Nearest, Margins]) -> Factor:
         sums, nearest, margins = found
-        lit = lit_share(fr, self.tab, nearest, self.rays, receivers)
+        lit = lit_share(*exact(fr, self.tab)[:2], nearest, self.rays, receivers)
         return _factor(self.tab, self.rule, fr, self.problem.k, margins, lit, 1, sums)
 
     @property
     def items(self) -> int:
-        """The number of pieces; 0 where ends of runs, or what a few rays tell of a block, are not enough for lists."""
-        options = self.problem.options
-        if self.rule.corners is None or options.rim == "smooth" or options.tolerance < LOOSE:
-            return 0
-        return int(self.tab.n_pieces[0])
+        """The number of pieces, or of marks of them and of runs; 0 where blocks are of no use."""
+        pieces = int(self.tab.n_pieces[0])
+        if self.problem.listed:
+            return pieces
+        return dr.width(self.tab.ranges) if self.probe is not None and pieces >= MARKED else 0
+
+    @property
+    def inside_only(self) -> bool:
+        """Whether it lists what acts on blocks."""
+        return self.problem.listed
 
     @property
     def probe(self) -> Rays | None:
@@ -262,11 +290,15 @@ class _Bodies:
         return self.rays if self.problem.options.occlusion != "none" else None
 
     def among(self, blocks: Blocks) -> Evaluate:
-        """By lists of what acts on the blocks."""
-        return partial(self.listed, self.lists(blocks))
+        """By what is known of blocks."""
+        return self.by(self.known(blocks))
 
-    def lists(self, blocks: Blocks) -> Lists:
-        """What acts on each block."""
+    def known(self, blocks: Blocks) -> Lists | Marks:
+        """What acts on each block, or which faint pieces reach it."""
         source, tolerance = self.problem.source, self.problem.options.tolerance
         search = Search(source, self.tab, self.k, self.rule, tolerance, self.share, self.probe, self.grazing)
-        return lists(search, blocks)
+        return lists(search, blocks) if self.problem.listed else marks(search, blocks)
+
+    def by(self, found: Lists | Marks) -> Evaluate:
+        """M of receivers in blocks, by what is known of these."""
+        return partial(self._by_lists if isinstance(found, Lists) else self._by_marks, found)

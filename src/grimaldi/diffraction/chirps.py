@@ -17,7 +17,7 @@ import numpy as np
 
 from grimaldi.diffraction import fine
 from grimaldi.diffraction.arrays import Types
-from grimaldi.diffraction.edges import chain_wave
+from grimaldi.diffraction.chains import chain_wave
 from grimaldi.diffraction.frame import Frame
 from grimaldi.diffraction.hierarchy import least_detour
 from grimaldi.diffraction.model import ACROSS, Receivers

@@ -12,10 +12,12 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import drjit as dr
+import numpy as np
 
+from grimaldi.diffraction.arrays import Types
 from grimaldi.diffraction.frame import Frame, way
 from grimaldi.diffraction.segment import Corners
-from grimaldi.diffraction.sines import sincos
+from grimaldi.diffraction.sines import rounded, sincos
 
 
 class Corner(NamedTuple):
@@ -42,14 +44,15 @@ class Ends(NamedTuple):
     turn: Any
 
 
-def corner(frame: Frame, X: Any, k: Any) -> Corner:
-    """The corner X, relative to the outlines' centre, with Δ and its slope free of cancellation."""
+def corner(frame: Frame, X: Any, k: Any, types: Types | None = None) -> Corner:
+    """The corner X, relative to the outlines' centre, with Δ and its slope free of cancellation; rounded to other
+    types at last, if there are any."""
     x = X - frame.foot
     h = dr.dot(x, frame.a)
-    return seen(frame, x - h * frame.a, h, k)
+    return seen(frame, x - h * frame.a, h, k, types)
 
 
-def seen(frame: Frame, q: Any, h: Any, k: Any) -> Corner:
+def seen(frame: Frame, q: Any, h: Any, k: Any, types: Types | None = None) -> Corner:
     """The point at q across the ray and h along it."""
     d2 = dr.squared_norm(q)
     z2 = frame.z2 - h
@@ -63,8 +66,13 @@ def seen(frame: Frame, q: Any, h: Any, k: Any) -> Corner:
         delta_r, along_r, inv_r = way(z1, d2)
         C = 0.5 + 0.5 * (z1 * z2 - d2) * inv_r * inv
         delta, along, inv = delta + delta_r, along - along_r, inv + inv_r
-    sin, cos = sincos(k * delta)
-    return Corner(q, h, d2, along, inv, C, cos, sin, dr.select(between, d2, dr.inf), dr.fma(z2, z2, d2))
+    on_ray2, to_p2 = dr.select(between, d2, dr.inf), dr.fma(z2, z2, d2)
+    if types is None:
+        sin, cos = sincos(k * delta)
+        return Corner(q, h, d2, along, inv, C, cos, sin, on_ray2, to_p2)
+    F = types.Float
+    sin, cos = rounded((0.5 / np.pi) * k * delta, F)
+    return Corner(types.Vector(q), F(h), F(d2), F(along), F(inv), F(C), cos, sin, F(on_ray2), F(to_p2))
 
 
 class Slopes(NamedTuple):

@@ -12,18 +12,15 @@ import mitsuba as mi
 import numpy as np
 
 from grimaldi.diffraction.arrays import on_device
-from grimaldi.diffraction.corners import Corner, between, by_halves, corner
-from grimaldi.diffraction.creeping import damped
+from grimaldi.diffraction.chains import Chain, Passed, ahead, basis, chain_wave, crossing, exact
 from grimaldi.diffraction.frame import ROUNDINGS, Frame, constant
 from grimaldi.diffraction.grazing import Near, grazed, other_than, worth
 from grimaldi.diffraction.hierarchy import NONE, least_detour
 from grimaldi.diffraction.model import Receivers
 from grimaldi.diffraction.occlusion import Rays
-from grimaldi.diffraction.segment import Corners, Line, Rule, Wave, growth, line, path, segment_wave
-from grimaldi.diffraction.table import Piece, Segment, Table
+from grimaldi.diffraction.segment import Rule, growth, line, path
+from grimaldi.diffraction.table import Piece, Table
 from grimaldi.syntax import syntax
-
-NEVER = Corners(0.0, 0.0, float("inf"))  # for traces where corners are not asked
 
 
 class Sum(NamedTuple):
@@ -49,111 +46,6 @@ class Margins(NamedTuple):
 
     ray2: Any
     receiver2: Any
-
-
-def to_receiver(fr: Frame, seg: Segment, ln: Line) -> Any:
-    """Squared distance of P to a segment."""
-    h = ln.h - fr.z2
-    t = dr.clip(ln.eqq * ln.td - h * ln.ea, 0, seg.length)
-    return dr.squared_norm(ln.q0 + t * ln.eq) + dr.square(h + t * ln.ea)
-
-
-def _basis(a: Any) -> tuple[Any, Any]:
-    """Two unit vectors across a (Duff et al., JCGT 6(1))."""
-    V = type(a)
-    sign = dr.copysign(type(a.x)(1), a.z)
-    c = -1 / (sign + a.z)
-    b = a.x * a.y * c
-    return V(1 + sign * a.x * a.x * c, sign * b, -sign * a.x), V(b, sign + a.y * a.y * c, -a.y)
-
-
-def _turn(c0: Any, c1: Any, kappa: Any) -> Any:
-    """Whether a segment crosses the half-plane from which its corners are c0 and c1 ahead, as ±1 or 0.
-
-    Summed over a closed loop this is (1/2π)∮dφ. The side of the ray comes from κ's sign bit, as in the boundary
-    wave itself: on the edge, where κ is 0, both must take the same side.
-    """
-    one = type(c0)(1)
-    ahead = dr.mulsign(one, c1 - c0)
-    crosses = ((c0 > 0) != (c1 > 0)) & (ahead == dr.mulsign(one, kappa))
-    return dr.select(crosses, ahead, 0)
-
-
-def _ahead(frame: Frame, seg: Segment, across: Any) -> tuple[Any, Any]:
-    """How far a segment's corners are ahead of the half-plane that `across` is a quarter turn ahead of."""
-    return dr.dot(seg.X0 - frame.foot, across), dr.dot(seg.X1 - frame.foot, across)
-
-
-class Chain(NamedTuple):
-    """What a few neighbouring segments send, and where the ray S→P passes them, n as in `planar_count`."""
-
-    wave: Wave
-    distance2: Any
-    segment: Any
-    receiver2: Any
-    n: Any
-
-
-class Passed(NamedTuple):
-    """What a chain's wave is multiplied by on its way X→P: whether it reaches P, and eq. 11's factor, by sgn κ."""
-
-    visible: Any
-    real: Any
-    imag: Any
-
-
-@syntax
-def chain_wave(
-    fr: Frame, tab: Table, first: Any, end: Any, k: Any, rule: Rule, passed: Passed | None, smooth: bool, active: Any
-) -> Chain:
-    """Σ ∫ C e^{ikΔ} dφ over the segments first..end, neighbours of one another; each corner is looked at once."""
-    F = tab.types.Float
-    U = dr.uint32_array_t(F)
-    by_corners = rule.corners is not None and not smooth
-    forms = rule.corners or NEVER
-    real, imag, err_real, err_imag, rounding2 = F(0), F(0), F(0), F(0), F(0)
-    distance2, segment, receiver2, n = F(dr.inf), U(first), F(dr.inf), F(0)
-    _, across = _basis(fr.a)
-    j = U(first)
-    last = tuple(corner(fr, tab.corner(j, 0), k))  # a plain tuple: what Dr.Jit can carry from turn to turn
-    while active & (j < end):
-        a, b = Corner(*last), corner(fr, tab.corner(j, 1), k)
-        ends = between(fr.a, a, b, k, forms)
-        wave = ends.real, ends.imag, F(0), F(0), F(0)
-        d2 = dr.minimum(a.on_ray2, b.on_ray2)
-        p2 = dr.minimum(a.to_p2, b.to_p2)
-        turn = F(ends.turn)
-        whole = active & ~ends.serves
-        if dr.hint(not by_corners, mode="scalar"):
-            whole = dr.mask_t(F)(active)
-        else:
-            halved = dr.mask_t(F)(whole)
-            if halved:
-                re, im, serves = by_halves(fr, a, b, k, forms)
-                whole &= ~serves
-                wave = re, im, F(0), F(0), F(0)
-        if whole:
-            seg = tab.segment(j)
-            ln = line(fr, seg.X0, seg.e)
-            full = segment_wave(fr, ln, seg.length, k, rule, whole)
-            if dr.hint(smooth, mode="scalar"):
-                full = damped(full, fr, ln, seg.length, seg.radius, k)
-            wave = tuple(full)
-            d2, p2, turn = closest(fr, seg, ln), to_receiver(fr, seg, ln), ln.kappa
-        n += _turn(dr.dot(a.q, across), dr.dot(b.q, across), turn)
-        if dr.hint(passed is not None, mode="scalar"):
-            assert passed is not None
-            wave = Wave(*wave).times(
-                dr.select(passed.visible, 1, 0) + dr.mulsign(passed.real, turn), dr.mulsign(passed.imag, turn)
-            )
-        real, imag, err_real = real + wave[0], imag + wave[1], err_real + wave[2]
-        err_imag, rounding2 = err_imag + wave[3], rounding2 + wave[4]
-        segment = dr.select(d2 < distance2, j, segment)
-        distance2 = dr.minimum(distance2, d2)
-        receiver2 = dr.minimum(receiver2, p2)
-        last = tuple(b)
-        j += 1
-    return Chain(Wave(real, imag, err_real, err_imag, rounding2), distance2, segment, receiver2, n)
 
 
 # ---------------------------------------------------------------- planar holes and masks
@@ -184,10 +76,10 @@ def planar_count(fr: Frame, tab: Table, active: Any) -> Any:
     """n of `planar_sum` alone."""
     F = tab.types.Float
     n, j = F(0), dr.uint32_array_t(F)(0)
-    _, across = _basis(fr.a)
+    _, across = basis(fr.a)
     while active & (j < tab.size):
         seg = tab.segment(j)
-        n += _turn(*_ahead(fr, seg, across), line(fr, seg.X0, seg.e).kappa)
+        n += crossing(*ahead(fr, seg, across), line(fr, seg.X0, seg.e).kappa)
         j += 1
     return n
 
@@ -222,6 +114,22 @@ def cut_off(fr: Frame, piece: Piece, k: Any) -> Any:
     return dr.sqrt(D) / (4 * np.pi * (D + w) * dr.sqrt(w))
 
 
+class Asked(NamedTuple):
+    """What a walk makes of the ways X→P from pieces."""
+
+    acts: Any  # those that are not known to be blocked
+    tested: Any  # those of them that take a ray
+    left: Any  # |M| that the others may be wrong by
+
+
+class Told(Protocol):
+    """What is known of ways X→P without a ray."""
+
+    def reach(self, item: Any, left: Any) -> tuple[Any, Any]:
+        """Which pieces are known to be blocked, and which to be free, where a chain cut off leaves |M| = left."""
+        ...
+
+
 class Walk(Protocol):
     """The pieces that receivers ask, one after the other."""
 
@@ -237,8 +145,8 @@ class Walk(Protocol):
         """The next place."""
         ...
 
-    def tested(self, fr: Frame, piece: Piece, k: Any, acts: Any) -> tuple[Any, Any]:
-        """Which pieces of those that act take a ray, and what |M| the others may be wrong by."""
+    def asked(self, fr: Frame, item: Any, piece: Piece, k: Any, acts: Any) -> Asked:
+        """What to ask of the pieces that act."""
         ...
 
     def weight(self, fr: Frame, piece: Piece) -> Any:
@@ -263,6 +171,7 @@ class Everywhere(NamedTuple):
 
     table: Table
     least: float = 0.0
+    told: Told | None = None
 
     def bounds(self, receivers: Receivers) -> tuple[Any, Any]:
         U = dr.uint32_array_t(self.table.types.Float)
@@ -282,11 +191,16 @@ class Everywhere(NamedTuple):
     def after(self, i: Any, inside: Any) -> Any:
         return self.table.tree.after(i, inside)
 
-    def tested(self, fr: Frame, piece: Piece, k: Any, acts: Any) -> tuple[Any, Any]:
-        """All but those that would leave less than `least` where a chain is cut off on them."""
+    def asked(self, fr: Frame, item: Any, piece: Piece, k: Any, acts: Any) -> Asked:
+        """All but those that are known, or would leave less than `least` where a chain is cut off on them."""
         left = cut_off(fr, piece, k)
-        tested = acts & (left > self.least)
-        return tested, dr.select(acts & ~tested, left, 0)
+        worth = left > self.least
+        unasked = dr.select(acts & ~worth, left, 0)
+        if self.told is None:
+            return Asked(acts, acts & worth, unasked)
+        blocked, free = self.told.reach(item, left)
+        acts &= ~blocked
+        return Asked(acts, acts & worth & ~free, unasked)
 
     def weight(self, fr: Frame, piece: Piece) -> Any:
         """By how near the ray it lies."""
@@ -297,16 +211,6 @@ class Everywhere(NamedTuple):
     ) -> Chain:
         """By its segments."""
         return chain_wave(fr, self.table, piece.first, piece.end, k, rule, passed, smooth, active)
-
-
-def closest(fr: Frame, seg: Segment, ln: Line) -> Any:
-    """Squared distance of the ray S→P to a segment, infinite outside of S..P."""
-    t = dr.clip(ln.td, 0, seg.length)
-    along = ln.h + t * ln.ea
-    between = fr.z2 - along > 0
-    if not fr.plane:
-        between &= fr.z1 + along > 0
-    return dr.select(between, ln.eqq * (dr.square(t - ln.td) + ln.w * ln.w), dr.inf)
 
 
 @syntax
@@ -329,7 +233,8 @@ def body_sum(
     """
     F = tab.types.Float
     U = dr.uint32_array_t(F)
-    n = tab.types.Vector(receivers.n)
+    ray, there, _ = exact(fr, tab)
+    n = there.types.Vector(receivers.n)
     p = mi.Point3f(receivers.p)
     if dr.hint(probe is not None, mode="scalar"):
         assert probe is not None
@@ -341,16 +246,17 @@ def body_sum(
     while receivers.active & (i < end):
         item, taken, inside = walk.visit(fr, i)
         if receivers.active & taken:
-            piece = tab.piece(item)
-            acts = sounds(fr, piece, n)
+            piece, finer = tab.piece(item), there.piece(item)
+            acts = sounds(ray, finer, n)
             visible = dr.mask_t(F)(acts)
             past_real, past_imag = F(0), F(0)
             if dr.hint(probe is not None, mode="scalar"):
                 assert probe is not None
-                tested, left = walk.tested(fr, piece, k, acts)
+                acts, tested, left = walk.asked(fr, item, piece, k, acts)
+                visible = dr.mask_t(F)(acts)
                 unasked += left
                 if tested:
-                    x = mi.Point3f(piece.middle + constant(tab.types.Vector, tab.centre))
+                    x = mi.Point3f(finer.middle + constant(there.types.Vector, tab.centre))
                     visible = acts & probe.reaches(x, piece, p, tested)
                 if dr.hint(beside is not None, mode="scalar"):
                     assert beside is not None
@@ -398,8 +304,8 @@ def _crossings(fr: Frame, tab: Table, bend: Any, n: Any, active: Any) -> Any:
             while acts & (j < piece.end):
                 seg = tab.segment(j)
                 ln = line(fr, seg.X0, seg.e)
-                c0, c1 = _ahead(fr, seg, across)
-                turn = _turn(c0, c1, ln.kappa)
+                c0, c1 = ahead(fr, seg, across)
+                turn = crossing(c0, c1, ln.kappa)
                 out = dr.abs(ln.kappa) * seg.length / dr.abs(c1 - c0)
                 z = ln.h + ln.ea * dr.clip(ln.td, 0, seg.length)
                 # the bent way is a triangle over the ray, `height` high where it bends

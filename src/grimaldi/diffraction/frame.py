@@ -9,7 +9,7 @@ import mitsuba as mi
 import numpy as np
 
 from grimaldi.diffraction.arrays import Types, on_device, types
-from grimaldi.diffraction.sines import of_turns
+from grimaldi.diffraction.sines import rounded
 from grimaldi.scene.model import Source, Spot, Vector
 from grimaldi.scene.planar import PlanarOutline
 
@@ -29,6 +29,7 @@ class Frame(NamedTuple):
     z2: Any  # from the foot to P
     lever: Any  # what its rounding is relative to
     plane: bool
+    exact: Any = None  # the same one in the precision of phases, if that is another
 
 
 class Frames(NamedTuple):
@@ -69,6 +70,7 @@ def frame(source: Source, p: Any, table: Table, screen: PlanarOutline | None = N
     rounding leaves open: through a corner exactly, the edges that meet there could not agree on its side.
     """
     V, out = types(double=True).Vector, table.types
+    precise = out.phases or out
     c, reach = constant(V, table.centre), on_device(dr.value_t(V), table.reach)
     if source.is_plane:
         assert source.direction is not None
@@ -90,13 +92,15 @@ def frame(source: Source, p: Any, table: Table, screen: PlanarOutline | None = N
         z2 = distance - z1
         foot = dr.select(z1 == 0, s - c, p - c - z2 * a)
     lever = reach + dr.norm(foot)
-    if screen is not None and dr.itemsize_v(out.Float) == 8:
+    if screen is not None and dr.itemsize_v(precise.Float) == 8:
         normal = constant(V, screen.normal)
         along = dr.dot(p - constant(V, screen.origin), normal) / dr.dot(a, normal)
         lever = dr.minimum(lever, dr.abs(along))
-    aside = constant(V, ROUNDINGS * dr.epsilon(out.Float) * np.array(ASIDE))
+    aside = constant(V, ROUNDINGS * dr.epsilon(precise.Float) * np.array(ASIDE))
     foot += lever * (aside - dr.dot(aside, a) * a)
-    return Frame(out.Vector(a), out.Vector(foot), out.Float(z1), out.Float(z2), out.Float(lever), source.is_plane)
+    exact = Frame(a, foot, z1, z2, lever, source.is_plane)
+    numbers = out.Vector(a), out.Vector(foot), out.Float(z1), out.Float(z2), out.Float(lever)
+    return Frame(*numbers, source.is_plane, exact if out.phases else None)
 
 
 def way(z: Any, d2: Any) -> tuple[Any, Any, Any]:
@@ -123,7 +127,7 @@ def incident(source: Source, p: Any, k: float, precision: Types) -> tuple[Any, A
         if source.spot is not None:
             modulus *= F(dr.sqrt(profile(source.spot, d / path)))
     turns = path * on_device(type(path), k / (2 * np.pi)) + on_device(type(path), source.phase / (2 * np.pi))
-    sin, cos = of_turns(F(turns - dr.round(turns)))
+    sin, cos = rounded(turns, F)
     return modulus, cos, sin
 
 

@@ -20,8 +20,9 @@ import numpy as np
 
 from grimaldi.diffraction import none
 from grimaldi.diffraction.arrays import types
+from grimaldi.diffraction.chains import closest
 from grimaldi.diffraction.curves import curve_error
-from grimaldi.diffraction.edges import Nearest, closest, lit_share, planar_count, sounds
+from grimaldi.diffraction.edges import Nearest, lit_share, planar_count, sounds
 from grimaldi.diffraction.frame import Frame, constant, frame
 from grimaldi.diffraction.model import NYQUIST, Evaluate, Factor, Options, Receivers
 from grimaldi.diffraction.occlusion import Rays, rays

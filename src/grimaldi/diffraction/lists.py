@@ -13,9 +13,10 @@ from typing import Any, NamedTuple
 import drjit as dr
 import mitsuba
 
+from grimaldi.diffraction.chains import Chain, Passed, chain_wave
 from grimaldi.diffraction.chirps import PLACES, SIDE, Chirps, place, quadrant
 from grimaldi.diffraction.corners import corner, leading
-from grimaldi.diffraction.edges import Chain, Margins, Nearest, Passed, Sum, chain_wave
+from grimaldi.diffraction.edges import Asked, Margins, Nearest, Sum
 from grimaldi.diffraction.frame import Frame
 from grimaldi.diffraction.grazing import Chords, Near
 from grimaldi.diffraction.hierarchy import NONE
@@ -147,9 +148,9 @@ class Listed(NamedTuple):
     def after(self, i: Any, inside: Any) -> Any:
         return i + 1
 
-    def tested(self, fr: Frame, piece: Piece, k: Any, acts: Any) -> tuple[Any, Any]:
-        """All: others are on no such list."""
-        return acts, 0
+    def asked(self, fr: Frame, item: Any, piece: Piece, k: Any, acts: Any) -> Asked:
+        """A ray of all: others are on no such list."""
+        return Asked(acts, acts, 0)
 
     def weight(self, fr: Frame, piece: Piece) -> Any:
         return 1

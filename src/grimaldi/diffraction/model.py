@@ -144,10 +144,15 @@ class Grouped(Protocol):
         """How much of the outlines is looked at for each block; 0 where blocks are of no use."""
         ...
 
+    @property
+    def inside_only(self) -> bool:
+        """Whether `among` gives no M of any meaning to what lies OUTSIDE of all blocks."""
+        ...
+
     def __call__(self, receivers: Receivers) -> Factor: ...
 
     def among(self, blocks: Blocks) -> Evaluate:
-        """The same for receivers in blocks; what lies OUTSIDE of all gets no M of any meaning."""
+        """The same for receivers that are placed in blocks."""
         ...
 
 

@@ -30,6 +30,11 @@ def of_turns(turns: Any) -> tuple[Any, Any]:
     return dr.mulsign(_polynomial(COSINE[size], t), turns), -v * _polynomial(SINE[size], t)
 
 
+def rounded(turns: Any, Float: Any) -> tuple[Any, Any]:
+    """The same as numbers of another precision, of an angle that is reduced in its own."""
+    return of_turns(Float(turns - dr.round(turns)))
+
+
 def _polynomial(coefficients: list[float], t: Any) -> Any:
     """The highest first, by Horner."""
     total = type(t)(coefficients[0])

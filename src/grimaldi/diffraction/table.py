@@ -15,6 +15,7 @@ from grimaldi.outlines.model import Outline, Reals
 from grimaldi.scene.model import Source, Vector
 
 LONGEST_PIECE = 8  # segments
+SINGLE = 5e-4  # tolerance from which on Float32 serves
 MANY = 2048  # pieces, that a hierarchy pays for: receivers beside each other go different ways through it
 
 
@@ -59,6 +60,7 @@ class Table(NamedTuple):
     far: Any  # what lies at a larger Δ adds nothing
     angle: Any  # half of what a run of pieces subtends at most about the ray, to reach the receiver or not as one [rad]
     types: Types
+    exact: Exact | None = None  # what tells phases, where numbers of these types are not enough
 
     def device(self, number: float) -> Any:
         """A number that is no part of the kernel."""
@@ -105,6 +107,13 @@ class Table(NamedTuple):
         )
 
 
+class Exact(NamedTuple):
+    """A table, and k, in the precision of phases."""
+
+    table: Table
+    k: Any
+
+
 def cut(outline: Outline) -> NDArray[np.int64]:
     """First segments of the pieces, and the number of segments: runs of a chain, a 64th of a body's extent or less."""
     bodies, of = np.unique(outline.body, return_inverse=True)
@@ -130,12 +139,17 @@ def cut(outline: Outline) -> NDArray[np.int64]:
     return np.flatnonzero(first)
 
 
+def may_be_single(options: Options) -> bool:
+    """Whether Float32 tells enough of all but phases."""
+    return options.precision == "auto" and options.tolerance >= SINGLE
+
+
 def needs_double(outline: Outline, k: float, options: Options) -> bool:
     """Whether Float32 corners, n of them in an outline k·extent radians wide, leave too much of the tolerance.
 
     Each is off by some k·extent·2⁻²⁴ radians, and no two alike. Where receivers lie beside edges, `boundary` tells.
     """
-    if options.precision == "double" or options.tolerance < 5e-4:
+    if not may_be_single(options):
         return True
     extent = np.ptp(np.concatenate([outline.start, outline.end]), axis=0).max()
     return k * float(extent) * len(outline) ** 0.5 * 2.0**-24 > 3 * options.tolerance
@@ -156,8 +170,12 @@ class Packed(NamedTuple):
     item: NDArray[np.int64]
     far: float
 
-    def on(self, types: Types, angle: float = 0.0) -> Table:
-        """The table in some precision; angle as in `Table`."""
+    def on(self, types: Types, angle: float = 0.0, k: float = 0.0) -> Table:
+        """The table in some precision; angle as in `Table`, k needed where phases have a precision of their own."""
+        exact = None
+        if types.phases is not None:
+            table = self.on(types.phases, angle)
+            exact = Exact(table, table.device(k))
         index = dr.uint32_array_t(types.Float)
         return Table(
             self.centre,
@@ -174,6 +192,7 @@ class Packed(NamedTuple):
             on_device(types.Float, min(self.far, 1e30)),
             on_device(types.Float, angle),
             types,
+            exact,
         )
 
 

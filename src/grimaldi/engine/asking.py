@@ -24,7 +24,7 @@ class Recordings:
     """Of a model, for all pictures in its light: at receivers anywhere and in blocks, each in both precisions."""
 
     whole: tuple[Recording, Recording] = field(default_factory=lambda: (Recording(), Recording()))
-    listed: tuple[Recording, Recording] = field(default_factory=lambda: (Recording(), Recording()))
+    placed: tuple[Recording, Recording] = field(default_factory=lambda: (Recording(), Recording()))
 
 
 def ask(film: Squares | None, factor: Evaluate, recordings: Recordings) -> Ask:
@@ -33,7 +33,10 @@ def ask(film: Squares | None, factor: Evaluate, recordings: Recordings) -> Ask:
     if film is None or pieces(factor) == 0:
         return lambda x, y, receivers: whole(receivers)
     assert isinstance(factor, Grouped)
-    return partial(_by_blocks, film, _replayed(factor.among(film.blocks), recordings.listed), whole)
+    placed = _replayed(factor.among(film.blocks), recordings.placed)
+    if factor.inside_only:
+        return partial(_by_blocks, film, placed, whole)
+    return lambda x, y, receivers: placed(film.placed(x, y, receivers))
 
 
 def pieces(factor: Evaluate) -> int:

@@ -51,7 +51,7 @@ class Hits(NamedTuple):
         the surface is not within Float32's rounding of it. Rays: `mi.Ray3f`, interactions: `mi.SurfaceInteraction3f`.
         """
         double = types(double=True)
-        F, V, P = double
+        F, V, P = double.Float, double.Vector, double.Packet
         index: Any = dr.reinterpret_array(mi.UInt32, si.shape)
         active = active & (index < self.count)
         shape = dr.gather(P, self.shapes, index, active)
@@ -119,7 +119,8 @@ def _triangle(disk: Disk) -> Mesh:
 
 def _planes(mesh: Mesh) -> Any:
     """Unit normal and h of each face, as packets; NaN where its corners lie in line."""
-    F, V, P = double = types(double=True)
+    double = types(double=True)
+    F, V, P = double.Float, double.Vector, double.Packet
     corners, faces = double.buffer(mesh.vertices), mi.UInt32(mesh.faces.astype(np.uint32).ravel())
     i = dr.arange(mi.UInt32, len(mesh.faces))
     a, b, c = (dr.gather(V, corners, dr.gather(mi.UInt32, faces, 3 * i + corner)) for corner in range(3))
