@@ -13,15 +13,15 @@ from pathlib import Path
 
 from grimaldi.bench.model import Result, Settings, Target
 from grimaldi.bench.timing import written
+from grimaldi.scene import builtin
 
-SCENES = ("slit", "creature")  # a plane of holes; a mesh
 COLD, WARM = 6.0, 2.0  # seconds
 
 
 def measure(settings: Settings) -> Result:
     if settings.quick:
         return first_pictures(("slit",), 8, settings)
-    return first_pictures(SCENES, 128, settings)
+    return first_pictures(builtin.names(), 128, settings)
 
 
 def first_pictures(scenes: Sequence[str], size: int, settings: Settings) -> Result:
