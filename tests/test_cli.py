@@ -228,10 +228,20 @@ def test_a_picture_loads_no_library_that_it_does_not_need(tmp_path: Path) -> Non
         "trimesh",
         "xarray",
     ]
-    arguments = ["grimaldi", "render", "young", "--size", "8x8", "--spp", "1", "-o", str(tmp_path / "x.png")]
+    arguments = ["render", "young", "--size", "8x8", "--spp", "1", "-o", str(tmp_path / "x.png")]
     script = (
-        f"import sys\nfrom grimaldi.cli import main\nsys.argv = {arguments}\n"
-        f"try:\n    main()\nfinally:\n    print([name for name in {heavy} if name in sys.modules])\n"
+        f"import sys\nfrom grimaldi.cli import run\nassert run({arguments}) == 0\n"
+        f"print([name for name in {heavy} if name in sys.modules])\n"
     )
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
     assert (done.returncode, done.stdout) == (0, "[]\n"), done.stderr
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a device that is full")
+def test_what_cannot_be_said_ends_with_one_line():
+    """What is printed last is still in a buffer then."""
+    with Path("/dev/full").open("w") as full:
+        words = [sys.executable, "-m", "grimaldi", "bench", "--list"]
+        done = subprocess.run(words, stdout=full, stderr=subprocess.PIPE, text=True)
+    assert done.returncode == 1
+    assert done.stderr == "grimaldi: [Errno 28] No space left on device\n"

@@ -121,12 +121,8 @@ def test_help_imports_nothing_heavy(argument: str) -> None:
     heavy = {"mitsuba", "drjit", "numpy", "scipy", "xarray", "matplotlib", "shapely", "trimesh", "pint"}
     printed = python(f"""
 import sys
-from grimaldi.cli import main
-sys.argv = ["grimaldi", "{argument}"]
-try:
-    main()
-except SystemExit as exit:
-    assert exit.code == 0
+from grimaldi.cli import run
+assert run(["{argument}"]) == 0
 print("loaded:", *{heavy!r} & set(sys.modules))
 """)
     assert printed.splitlines()[-1].split() == ["loaded:"]
