@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+from contextlib import suppress
 
 from grimaldi.cli.messages import fail, one_line_each
 from grimaldi.engine.interrupt import asked, listen
@@ -16,8 +17,10 @@ def main() -> None:
     """Run the command line and exit: 0 done, 2 wrong input (one line), 130 interrupted, 1 anything else."""
     listen()
     code = run(sys.argv[1:])
-    sys.stderr.flush()
-    os._exit(code)  # all that is written is: Mitsuba and Dr.Jit take an eighth of a second to free their memory
+    for stream in (sys.stdout, sys.stderr):
+        with suppress(OSError):  # a full disk is said already
+            stream.flush()
+    os._exit(code)  # Mitsuba and Dr.Jit take an eighth of a second to free their memory
 
 
 def run(arguments: list[str]) -> int:

@@ -30,6 +30,11 @@ class Types(NamedTuple):
     Packet: Any  # four floats of a record, read at once
     phases: Types | None = None  # of what phases are told by, if not these
 
+    @property
+    def precise(self) -> Types:
+        """What phases and the places of edges are told by."""
+        return self.phases or self
+
     def buffer(self, values: NDArray[Any]) -> Any:
         """Numbers as one flat device buffer."""
         return buffer(self.Float, values)

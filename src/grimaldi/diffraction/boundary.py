@@ -74,9 +74,7 @@ class Problem(NamedTuple):
     @property
     def listed(self) -> bool:
         """Whether ends of runs, and what a few rays tell of a block, are enough for lists."""
-        options = self.options
-        enough = options.rim != "smooth" and options.tolerance >= LOOSE
-        return enough and self.rule().corners is not None
+        return self.options.rim != "smooth" and self.options.tolerance >= LOOSE
 
 
 def boundary(scene: Scene, source: Source, outline: Outline, k: float, options: Options) -> Evaluate:
@@ -160,7 +158,7 @@ def _rounding(tab: Table, fr: Frame, k: float, margins: Margins) -> Any:
     the way to it.
     """
     F = tab.types.Float
-    of_edges = (tab.types.phases or tab.types).Float
+    of_edges = tab.types.precise.Float
     shift = dr.epsilon(of_edges) * (10 * fr.lever + tab.device(tab.reach))
     near = dr.rsqrt(dr.maximum(margins.receiver2, 1e-30)) + dr.rcp(tab.device(tab.from_source))
     error = 4 * dr.epsilon(F) + 2 * shift * (dr.sqrt(near * tab.device(k / (2 * np.pi))) + near / np.pi)

@@ -70,7 +70,6 @@ def frame(source: Source, p: Any, table: Table, screen: PlanarOutline | None = N
     rounding leaves open: through a corner exactly, the edges that meet there could not agree on its side.
     """
     V, out = types(double=True).Vector, table.types
-    precise = out.phases or out
     c, reach = constant(V, table.centre), on_device(dr.value_t(V), table.reach)
     if source.is_plane:
         assert source.direction is not None
@@ -92,11 +91,11 @@ def frame(source: Source, p: Any, table: Table, screen: PlanarOutline | None = N
         z2 = distance - z1
         foot = dr.select(z1 == 0, s - c, p - c - z2 * a)
     lever = reach + dr.norm(foot)
-    if screen is not None and dr.itemsize_v(precise.Float) == 8:
+    if screen is not None and dr.itemsize_v(out.precise.Float) == 8:
         normal = constant(V, screen.normal)
         along = dr.dot(p - constant(V, screen.origin), normal) / dr.dot(a, normal)
         lever = dr.minimum(lever, dr.abs(along))
-    aside = constant(V, ROUNDINGS * dr.epsilon(precise.Float) * np.array(ASIDE))
+    aside = constant(V, ROUNDINGS * dr.epsilon(out.precise.Float) * np.array(ASIDE))
     foot += lever * (aside - dr.dot(aside, a) * a)
     exact = Frame(a, foot, z1, z2, lever, source.is_plane)
     numbers = out.Vector(a), out.Vector(foot), out.Float(z1), out.Float(z2), out.Float(lever)
