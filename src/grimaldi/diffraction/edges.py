@@ -293,11 +293,14 @@ def _crossings(fr: Frame, tab: Table, bend: Any, n: Any, active: Any) -> Any:
     q = x - along * fr.a
     height = dr.norm(q)
     across = dr.cross(fr.a, q / height)
-    walk = Everywhere(tab)
     count, i = F(0), U(0)
     while active & (i < tab.tree.size):
-        item, taken, inside = walk.visit(fr, i)
-        if active & taken:
+        centre, radius = tab.tree.node(i)
+        c = centre - fr.foot
+        inside = dr.squared_norm(c - dr.dot(c, fr.a) * fr.a) <= dr.square(radius + height)
+        item = tab.tree.item_of(i)
+        single = item < tab.n_pieces
+        if active & inside & single:
             piece = tab.piece(item)
             acts = sounds(fr, piece, n)
             j = U(piece.first)
@@ -314,7 +317,7 @@ def _crossings(fr: Frame, tab: Table, bend: Any, n: Any, active: Any) -> Any:
                     top = dr.minimum(top, (fr.z1 + z) / (fr.z1 + along))
                 count += dr.select(out < height * dr.minimum(top, 1), turn, 0)
                 j += 1
-        i = walk.after(i, inside)
+        i = tab.tree.after(i, inside & ~single)
     return count
 
 
