@@ -19,7 +19,8 @@ from grimaldi.options import describe
 if TYPE_CHECKING:
     import xarray as xr
 
-    from grimaldi.engine.tiles import Shot, Tile
+    from grimaldi.engine.samples import Tile
+    from grimaldi.engine.tiles import Shot
     from grimaldi.light import Light, Settings
     from grimaldi.scene.model import Scene
 
@@ -221,7 +222,7 @@ def _side_by_side(scene: Scene, light: Light, settings: Settings, shot: Shot, do
     attrs |= {"wavelength": list(wavelengths), "spp": shot.spp, "seed": shot.seed, "non_finite": lost}
     return Layers(
         np.moveaxis(picture.reshape(-1, *image), 0, 2),
-        np.concatenate([tile.U for tile in done], axis=1).astype(np.complex64).reshape(of_field),
+        np.concatenate([tile.U for tile in done], axis=1).reshape(of_field),
         np.concatenate([tile.intensity for tile in done]).reshape(image),
         np.concatenate([tile.error for tile in done], axis=1).reshape(of_field),
         {1: ("L",), 3: ("R", "G", "B")}[len(picture)],

@@ -13,14 +13,13 @@ from typing import Any, NamedTuple
 
 import drjit as dr
 import mitsuba
-import numpy as np
-from numpy.typing import NDArray
 
 from grimaldi.diffraction.model import OUTSIDE, Factor, Receivers
 from grimaldi.engine.asking import Ask, ask, pieces
 from grimaldi.engine.blocks import Sight, squares
 from grimaldi.engine.cells import Cells, Known, cells
 from grimaldi.engine.nodes import LARGEST, ROWS, Nodes
+from grimaldi.engine.samples import Tile, Traced, means
 from grimaldi.light import Light, Reflected
 from grimaldi.tracing import trace
 
@@ -56,22 +55,6 @@ class Shot:
     max_depth: int
     rr_depth: int
     hide_emitters: bool
-
-
-@dataclass(frozen=True, eq=False)
-class Tile:
-    """Means over each of n pixels, one after the other from pixel `first` in rows.
-
-    U and its error over the samples that saw a surface, radiance over all; `lost` counts samples that were not
-    finite and left out.
-    """
-
-    first: int
-    picture: NDArray[np.float32]  # (channels, n)
-    U: NDArray[np.complex64]  # (keys, n)
-    error: NDArray[np.float32]  # (keys, n)
-    intensity: NDArray[np.float32]  # (n,)
-    lost: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -194,34 +177,15 @@ def _at_samples(light: Light, ask: Ask, sensor: Any, shot: Shot, first: int, pix
     return Samples(rank, receivers.active, *values)
 
 
-class _Traced(NamedTuple):
-    """What samples of a tile brought: radiance of the channels, whether all of it is finite, and what `Path` tells."""
-
-    radiance: list[Any]
-    finite: Any
-    seen: Any
-    real: list[Any]
-    imag: list[Any]
-    error: list[Any]
-
-    def put(self, some: _Traced, index: Any) -> None:
-        """Replace what samples brought."""
-        dr.scatter(self.finite, some.finite, index)
-        dr.scatter(self.seen, some.seen, index)
-        for own, new in zip((self.radiance, *self[3:]), (some.radiance, *some[3:]), strict=True):
-            for values, of_some in zip(own, new, strict=True):
-                dr.scatter(values, of_some, index)
-
-
 def render_tile(light: Light, sensor: Any, shot: Shot, first: int, pixels: int, band: Band | None = None) -> Tile:
-    """Trace the samples of `pixels` pixels from `first` on; without a band M is asked for at every sample."""
+    """Trace the samples of `pixels` pixels from `first` on, in rows; without a band M is asked for at every sample."""
     band = band or Band(0, shot.height, (), ())
     ways = zip(band.asks, band.cells, strict=True)
     single = [_at_samples(light, ask, sensor, shot, first, pixels, m) for ask, m in ways]
     begin = partial(_traced, light, sensor, shot, first, band.cells, single)
     index = dr.arange(mi.UInt32, pixels * shot.spp)
     if not single or shot.max_depth != 2:
-        return _means(begin(index, asks=True), shot, first)
+        return means(begin(index, asks=True), pixels, shot.spp)
     traced = begin(index, asks=False)  # M is known wherever the sources' light is asked for, but for few samples
     left: Any = dr.compress(~traced.finite)
     if len(left):
@@ -230,7 +194,7 @@ def render_tile(light: Light, sensor: Any, shot: Shot, first: int, pixels: int, 
         left = dr.compress(~traced.finite)
     if len(left):  # that see another surface now: beside an edge rounding decides
         traced.put(begin(left, asks=True), left)
-    return _means(traced, shot, first)
+    return means(traced, pixels, shot.spp)
 
 
 def _at(light: Light, ask: Ask, sensor: Any, shot: Shot, first: int, index: Any) -> Samples:
@@ -252,7 +216,7 @@ def _traced(
     single: list[Samples],
     index: Any,
     asks: bool,
-) -> _Traced:
+) -> Traced:
     """Paths of samples of a tile; where M is not known it is NaN, if the model is not to be asked."""
     pixel = index // dr.opaque(mi.UInt32, shot.spp)
     stream, film = _sample(shot, dr.opaque(mi.UInt32, first) + pixel, index % dr.opaque(mi.UInt32, shot.spp))
@@ -288,34 +252,6 @@ def _traced(
     finite = dr.all(dr.isfinite(radiance))
     for re, im in zip(path.real, path.imag, strict=True):
         finite &= dr.isfinite(re) & dr.isfinite(im)
-    traced = _Traced(list(radiance), finite, path.seen, path.real, path.imag, path.error)
+    traced = Traced(list(radiance), finite, path.seen, path.real, path.imag, path.error)
     dr.eval(*traced)  # all in one kernel
     return traced
-
-
-def _means(traced: _Traced, shot: Shot, first: int) -> Tile:
-    """What the samples of each pixel say."""
-    finite, seen = traced.finite, traced.finite & traced.seen
-
-    def total(values: Any, over: Any) -> Any:
-        return dr.block_sum(dr.select(over, mi.Float(values), 0), shot.spp)
-
-    of_all, of_seen = (dr.maximum(total(1, over), 1) for over in (finite, seen))
-    dr.eval(of_all, of_seen)
-
-    picture = [total(channel, finite) / of_all for channel in traced.radiance]
-    real, imag, error = ([total(x, seen) / of_seen for x in values] for values in traced[3:])
-    power = mi.Float64(0)
-    for re, im in zip(traced.real, traced.imag, strict=True):
-        power += re * re + im * im
-    intensity = total(power, seen) / of_seen
-    lost: Any = dr.count(~finite)
-    dr.eval(picture, real, imag, error, intensity, lost)
-    return Tile(
-        first,
-        np.stack([x.numpy() for x in picture]),
-        np.stack([re.numpy() + 1j * im.numpy() for re, im in zip(real, imag, strict=True)]),
-        np.stack([x.numpy() for x in error]),
-        intensity.numpy(),
-        int(lost[0]),
-    )
