@@ -147,19 +147,18 @@ def _group(nodes: _Nodes, seed: Integers, candidates: NDArray[np.bool_]) -> _Gro
     """The block of the surface that sample `seed` of each square lies on, of samples that are `candidates`."""
     of = np.arange(len(seed)), seed
     P, N = nodes.p[of], nodes.n[of]
-    slant = (nodes.d * N[:, None]).sum(2)
     with np.errstate(divide="ignore", invalid="ignore"):
-        t = ((P[:, None] - nodes.o) * N[:, None]).sum(2) / slant
+        t = _along(P[:, None] - nodes.o, N) / _along(nodes.d, N)
         plane = nodes.o + t[:, :, None] * nodes.d
-    size = np.linalg.norm(plane - plane[:, MIDDLE : MIDDLE + 1], axis=2).max(1)
-    off = np.abs(((nodes.p - P[:, None]) * N[:, None]).sum(2))
-    along = (nodes.n * N[:, None]).sum(2) > 1 - PLANE**2
+    size = _length(plane - plane[:, MIDDLE : MIDDLE + 1]).max(1)
+    off = np.abs(_along(nodes.p - P[:, None], N))
+    along = _along(nodes.n, N) > 1 - PLANE**2
     coplanar = candidates & along & (off <= PLANE * size[:, None])
     flat = ((t > 0) & (t < DEEPEST * t[of][:, None])).all(1) & (coplanar.sum(1) >= FACE)
 
     same = candidates & (nodes.shape == nodes.shape[of][:, None])
-    away = np.where(same, np.linalg.norm(nodes.p - P[:, None], axis=2), 0).max(1)
-    turned = np.where(same, np.linalg.norm(nodes.n - N[:, None], axis=2), 0).max(1)
+    away = np.where(same, _length(nodes.p - P[:, None]), 0).max(1)
+    turned = np.where(same, _length(nodes.n - N[:, None]), 0).max(1)
     alone = same.sum(1) == 1
     away = np.where(alone, 0.5 * np.linalg.norm(nodes.p - nodes.o, axis=2)[of] * np.ptp(nodes.d, axis=1).max(1), away)
     return _Group(
@@ -172,6 +171,16 @@ def _group(nodes: _Nodes, seed: Integers, candidates: NDArray[np.bool_]) -> _Gro
         np.where(flat[:, None, None], plane, nodes.p),
         np.where(flat[:, None, None], N[:, None], nodes.n),
     )
+
+
+def _along(v: Reals, n: Reals) -> Reals:
+    """How far vectors (squares, m, 3) go along those of their squares (squares, 3); NumPy sums rows of three slowly."""
+    return np.einsum("smi,si->sm", v, n)
+
+
+def _length(v: Reals) -> Reals:
+    """Of vectors (squares, m, 3)."""
+    return np.sqrt(np.einsum("smi,smi->sm", v, v))
 
 
 def _beside(group: _Group, square: Integers, further: list[Integers], across: int, down: int) -> list[Integers]:
