@@ -154,13 +154,15 @@ def _group(nodes: _Nodes, seed: Integers, candidates: NDArray[np.bool_]) -> _Gro
     off = np.abs(_along(nodes.p - P[:, None], N))
     along = _along(nodes.n, N) > 1 - PLANE**2
     coplanar = candidates & along & (off <= PLANE * size[:, None])
-    flat = ((t > 0) & (t < DEEPEST * t[of][:, None])).all(1) & (coplanar.sum(1) >= FACE)
+    flat = ((t > 0) & (t < DEEPEST * t[of][:, None])).all(1) & (np.count_nonzero(coplanar, axis=1) >= FACE)
 
     same = candidates & (nodes.shape == nodes.shape[of][:, None])
     away = np.where(same, _length(nodes.p - P[:, None]), 0).max(1)
     turned = np.where(same, _length(nodes.n - N[:, None]), 0).max(1)
-    alone = same.sum(1) == 1
-    away = np.where(alone, 0.5 * np.linalg.norm(nodes.p - nodes.o, axis=2)[of] * np.ptp(nodes.d, axis=1).max(1), away)
+    alone = np.count_nonzero(same, axis=1) == 1
+    (single,) = np.nonzero(alone)
+    distance = np.linalg.norm(P[single] - nodes.o[single, seed[single]], axis=1)
+    away[single] = 0.5 * distance * np.ptp(nodes.d[single], axis=1).max(1)
     return _Group(
         np.where(flat[:, None], plane[:, MIDDLE], P),
         N,
