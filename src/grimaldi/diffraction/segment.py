@@ -37,9 +37,9 @@ class Corners(NamedTuple):
 
     @staticmethod
     def of(tolerance: float) -> Corners:
-        """What leaves a segment within a tenth of the tolerance, over random geometries (tests/test_corners.py)."""
-        most = tolerance**0.55
-        return Corners(4.4 * most, 0.75 * most, tolerance**-0.5)
+        """What leaves a segment within a tenth of its share (benchmarks/segment_rules.py)."""
+        root = tolerance**0.5
+        return Corners(2.5 * root, 0.36 * root, 2 / root)
 
 
 class Rule(NamedTuple):
