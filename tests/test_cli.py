@@ -93,12 +93,14 @@ def said(done: subprocess.CompletedProcess[str]) -> str:
         (["field", "young", "-o", "x.npz", "--points", "p.txt"], "p.txt: unknown kind of file"),
         (["field", "young", "-o", "x.npz", "--points", "words.csv"], "words.csv: not a table of numbers"),
         (["field", "young", "-o", "x.npz", "--points", "two.csv"], "two.csv: has the shape (1, 2)"),
+        (["field", "young", "-o", "x.npz", "--points", "empty.csv"], "empty.csv: has the shape (0, 3)"),
         (["field", "young", "-o", "x.npz", "--points", "nan.csv"], "nan.csv: row 2 is not finite"),
         (["field", "young", "-o", "x.npz", "--points", "words.npy"], "words.npy: not a table of numbers"),
         (["field", "young", "-o", "x.npz", "--plane", "0,0,0; 1,0,0; 0,1,0"], "--plane: cannot read"),
         (["field", "young", "-o", "x.npz", "--plane", "0,0; 1,0; 0,1; 2x2"], "--plane: cannot read"),
         (["field", "young", "-o", "x.npz", "--plane", "0,0,0; 1,0,0; 0,nan,0; 2x2"], "--plane: cannot read"),
         (["field", "young", "-o", "x.npz", "--plane", "0,0,0; 1,0,0; 0,1,0; 0x2"], "--plane: cannot read"),
+        (["field", "young", "-o", "x.npz", "--plane", "0,0,0; 1,0,0; 3,0,0; 2x2"], "lie in one line"),
         (["field", "young", "-o", "x.dat", "--plane", PLANE], "x.dat: unknown kind of file"),
         (["field", "young", "-o", "folder.nc", "--plane", PLANE], "folder.nc: is a folder"),
         (["field", "young", "-o", "words.zarr", "--plane", PLANE], "words.zarr: is a file"),
@@ -111,6 +113,7 @@ def test_wrong_usage_is_one_line_and_writes_nothing(tmp_path: Path, arguments: l
     (tmp_path / "words.zarr").write_text("not a folder")
     (tmp_path / "folder.nc").mkdir()
     (tmp_path / "two.csv").write_text("1,2\n")
+    (tmp_path / "empty.csv").write_text("x, y, z\n")
     (tmp_path / "nan.csv").write_text("1,2,3\n4,nan,6\n")
     (tmp_path / "words.npy").write_text("not an array")
     before = sorted(tmp_path.iterdir())

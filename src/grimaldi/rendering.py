@@ -193,7 +193,7 @@ def shot_of(sensor: Any, own: Any, spp: int | None, seed: int, max_depth: int | 
     width, height = (int(v) for v in sensor.film().crop_size())
     count = sensor.sampler().sample_count() if spp is None else spp
     if not isinstance(count, int) or isinstance(count, bool) or not 1 <= count <= 1 << 20:
-        raise InputError(f"spp: {count!r} is no number of samples; give 1 or more, such as 16")
+        raise InputError(f"spp: {count!r} is no number of samples; give 1 to {1 << 20}, such as 16")
     if not isinstance(seed, int) or isinstance(seed, bool) or not 0 <= seed < 1 << 32:
         raise InputError(f"seed: {seed!r} is no seed; give an integer from 0 to 2^32 - 1")
     depth = max_depth if max_depth is not None else (own.max_depth if own is not None else 2)

@@ -14,13 +14,16 @@ Points = NDArray[np.float64]
 
 
 def read_points(path: Path) -> Points:
-    """Points (n, 3) from a .npy file, or from a .csv file with x, y, z in rows ('#' begins a comment)."""
+    """Points (n, 3) from a .npy file, or from a .csv file: x, y, z in rows, under these names or not.
+
+    '#' begins a comment.
+    """
     try:
         match path.suffix.lower():
             case ".npy":
                 values = np.load(path, allow_pickle=False)
             case ".csv":
-                values = np.loadtxt(path, delimiter=",", ndmin=2)
+                values = _table(path.read_text())
             case suffix:
                 raise InputError(f"{path}: unknown kind of file {suffix!r}; give points as .npy or .csv")
         points = np.asarray(values, dtype=np.float64)
@@ -34,6 +37,14 @@ def read_points(path: Path) -> Points:
     if len(bad):
         raise InputError(f"{path}: row {bad[0] + 1} is not finite; remove or mend it")
     return points
+
+
+def _table(text: str) -> Points:
+    """Numbers in rows (n, m)."""
+    rows = [row for line in text.splitlines() if (row := line.partition("#")[0].strip())]
+    if rows and rows[0].replace(" ", "").lower() == "x,y,z":
+        del rows[0]
+    return np.loadtxt(rows, delimiter=",", ndmin=2) if rows else np.empty((0, 3))
 
 
 def parse_plane(text: str) -> tuple[Points, dict[str, Any]]:
@@ -54,6 +65,8 @@ def parse_plane(text: str) -> tuple[Points, dict[str, Any]]:
             f"--plane: cannot read {text!r}; write 'x,y,z; x,y,z; x,y,z; NxM': "
             "a corner, the ends of the two sides that start there, and the points along each"
         ) from None
+    if min(columns, rows) > 1 and not np.linalg.norm(np.cross(*sides)) > 1e-9 * np.prod(np.linalg.norm(sides, axis=1)):
+        raise InputError(f"--plane: the sides of {text!r} lie in one line; give two that do not, or a grid of Nx1")
     u = np.linspace(0.0, 1.0, columns)[None, :, None]
     v = np.linspace(0.0, 1.0, rows)[:, None, None]
     points = corner + u * sides[0] + v * sides[1]
