@@ -8,8 +8,12 @@ import sys
 
 import pytest
 
+import grimaldi
 from grimaldi.engine import progress as module
+from grimaldi.engine.asking import work
 from grimaldi.engine.progress import progress
+from grimaldi.light import Settings, prepare
+from grimaldi.variants import ensure_variant
 
 
 class Terminal(io.StringIO):
@@ -55,6 +59,8 @@ def test_an_interrupt_that_got_lost_is_raised_at_the_next_step():
 import signal, time
 from grimaldi.engine import interrupt
 from grimaldi.engine.progress import progress
+from grimaldi.light import Settings, prepare
+from grimaldi.variants import ensure_variant
 interrupt.listen()
 try:
     signal.raise_signal(signal.SIGINT)
@@ -67,3 +73,11 @@ print("went on")
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert "KeyboardInterrupt" in done.stderr
     assert "went on" not in done.stdout
+
+
+@pytest.mark.parametrize(("tolerance", "least", "most"), [(1e-3, 4.0, 64.0), (1e-2, 1.0, 1.0)])
+def test_tiles_are_smaller_where_every_piece_takes_a_ray(tolerance, least, most):
+    """Else nothing is said for half a minute; by lists a receiver takes a hundredth of that."""
+    ensure_variant("rgb")
+    light = prepare(grimaldi.load("creature"), Settings(wavelength=0.4, tolerance=tolerance))
+    assert least <= work(light.beams[0].factor) <= most

@@ -15,7 +15,7 @@ import drjit as dr
 import mitsuba
 
 from grimaldi.diffraction.model import OUTSIDE, Factor, Receivers
-from grimaldi.engine.asking import Ask, ask, pieces
+from grimaldi.engine.asking import Ask, ask, pieces, work
 from grimaldi.engine.blocks import Sight, squares
 from grimaldi.engine.cells import Cells, Known, cells
 from grimaldi.engine.nodes import LARGEST, ROWS, Nodes
@@ -25,7 +25,7 @@ from grimaldi.tracing import trace
 
 mi: Any = mitsuba  # the stubs refuse numbers where arrays are asked for
 
-ASKED = 1 << 19  # rays of a tile at whose ends the model is asked for M: a few seconds of work
+ASKED = 1 << 19  # rays of a tile at whose ends the model is asked for M, fewer where that takes long: some seconds
 RAYS = 1 << 22  # of a tile in all: some hundred bytes each
 PAIRS = 1 << 27  # of blocks of a band and what is looked at for them
 NODES = 1 << 23  # of the cells of a band of the film: some twenty bytes each
@@ -90,7 +90,8 @@ def bands(light: Light, sensor: Any, shot: Shot) -> Iterator[Band]:
 def tiles(light: Light, shot: Shot, band: Band) -> Iterator[tuple[int, int]]:
     """First pixel and number of pixels of each tile of a band."""
     pixels = shot.width * band.rows
-    asked = sum(min(m.unknown / pixels, 1) for m in band.cells) if band.cells else float(light.asks)
+    shares = [min(m.unknown / pixels, 1) for m in band.cells] if band.cells else [float(light.asks)] * len(light.beams)
+    asked = sum(share * work(beam.factor) for share, beam in zip(shares, light.beams, strict=True))
     step = int(max(min(RAYS, ASKED / max(asked, 1e-9)) // shot.spp, 1))
     first = band.top * shot.width
     for begin in range(0, pixels, step):
