@@ -59,8 +59,6 @@ def test_an_interrupt_that_got_lost_is_raised_at_the_next_step():
 import signal, time
 from grimaldi.engine import interrupt
 from grimaldi.engine.progress import progress
-from grimaldi.light import Settings, prepare
-from grimaldi.variants import ensure_variant
 interrupt.listen()
 try:
     signal.raise_signal(signal.SIGINT)

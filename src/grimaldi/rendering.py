@@ -19,10 +19,12 @@ from grimaldi.options import describe
 if TYPE_CHECKING:
     import xarray as xr
 
-    from grimaldi.engine.samples import Tile
+    from grimaldi.engine.means import Tile
     from grimaldi.engine.tiles import Shot
     from grimaldi.light import Light, Settings
     from grimaldi.scene.model import Scene
+
+SAMPLES = 1 << 20  # a pixel, at most
 
 
 def render(
@@ -192,8 +194,8 @@ def shot_of(sensor: Any, own: Any, spp: int | None, seed: int, max_depth: int | 
 
     width, height = (int(v) for v in sensor.film().crop_size())
     count = sensor.sampler().sample_count() if spp is None else spp
-    if not isinstance(count, int) or isinstance(count, bool) or not 1 <= count <= 1 << 20:
-        raise InputError(f"spp: {count!r} is no number of samples; give 1 to {1 << 20}, such as 16")
+    if not isinstance(count, int) or isinstance(count, bool) or not 1 <= count <= SAMPLES:
+        raise InputError(f"spp: {count!r} is no number of samples; give 1 to {SAMPLES}, such as 16")
     if not isinstance(seed, int) or isinstance(seed, bool) or not 0 <= seed < 1 << 32:
         raise InputError(f"seed: {seed!r} is no seed; give an integer from 0 to 2^32 - 1")
     depth = max_depth if max_depth is not None else (own.max_depth if own is not None else 2)

@@ -65,7 +65,7 @@ def parse_plane(text: str) -> tuple[Points, dict[str, Any]]:
             f"--plane: cannot read {text!r}; write 'x,y,z; x,y,z; x,y,z; NxM': "
             "a corner, the ends of the two sides that start there, and the points along each"
         ) from None
-    if min(columns, rows) > 1 and not np.linalg.norm(np.cross(*sides)) > 1e-9 * np.prod(np.linalg.norm(sides, axis=1)):
+    if min(columns, rows) > 1 and np.linalg.norm(np.cross(*sides)) <= 1e-9 * np.linalg.norm(sides, axis=1).prod():
         raise InputError(f"--plane: the sides of {text!r} lie in one line; give two that do not, or a grid of Nx1")
     u = np.linspace(0.0, 1.0, columns)[None, :, None]
     v = np.linspace(0.0, 1.0, rows)[:, None, None]

@@ -13,7 +13,7 @@ from grimaldi.diffraction.model import OUTSIDE, Evaluate, Factor, Grouped, Recei
 from grimaldi.engine.blocks import Squares
 from grimaldi.engine.frozen import Recording, frozen
 
-FEW = 128  # pieces, that take no longer by themselves than lists
+ALONE = 128  # pieces, that take no longer one by one than lists
 FEWEST = 31  # receivers: of as many as there are of something else, or one, each would be recorded anew
 
 Ask = Callable[[Any, Any, Receivers], Factor]
@@ -47,7 +47,8 @@ def pieces(factor: Evaluate) -> int:
 
 def work(factor: Evaluate) -> float:
     """How long it takes to ask a model for M at a receiver, by lists or behind holes about 1."""
-    return max(factor.items / FEW, 1.0) if isinstance(factor, Grouped) and not factor.inside_only else 1.0
+    listed = isinstance(factor, Grouped) and factor.inside_only
+    return 1.0 if listed else max(pieces(factor) / ALONE, 1.0)
 
 
 def _replayed(evaluate: Evaluate, recordings: tuple[Recording, Recording]) -> Evaluate:

@@ -18,8 +18,8 @@ from grimaldi.diffraction.model import OUTSIDE, Factor, Receivers
 from grimaldi.engine.asking import Ask, ask, pieces, work
 from grimaldi.engine.blocks import Sight, squares
 from grimaldi.engine.cells import Cells, Known, cells
+from grimaldi.engine.means import Tile, Traced, means
 from grimaldi.engine.nodes import LARGEST, ROWS, Nodes
-from grimaldi.engine.samples import Tile, Traced, means
 from grimaldi.light import Light, Reflected
 from grimaldi.tracing import trace
 
