@@ -52,7 +52,7 @@ class Misses:
             f"tolerance {self.tolerance:g} is not reached at {self.count} of {self.of} points: the error of M may be "
             f"{self.worst:.1g} at ({place}){edge}; `error` has it for each point",
             GrimaldiWarning,
-            stacklevel=3,
+            stacklevel=4,
         )
 
 
@@ -85,5 +85,5 @@ def warn_of_faint_light(U: NDArray[np.complex128], free: Reals, tolerance: float
         f"the light is below {FEW * tolerance:g} of what it is without obstacles at {faint.sum()} of {faint.size} "
         f"points, where tolerance={tolerance:g} leaves few digits; ask for tolerance={finer:g}",
         GrimaldiWarning,
-        stacklevel=3,
+        stacklevel=4,
     )

@@ -35,7 +35,7 @@ def warn_of_fine_fringes(scene: Scene, sensor: Any, wavelengths: Sequence[float]
             f"{scene.name}: at wavelength {shortest:g} fringes are {min(widths):.2g} pixels wide and alias; take more "
             f"pixels, a closer camera, or a wavelength of about {suggested_wavelength(scene, sensor):.2g}",
             GrimaldiWarning,
-            stacklevel=4,
+            stacklevel=5,
         )
 
 

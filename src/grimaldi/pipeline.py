@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from grimaldi.errors import InputError
+from grimaldi.one_at_a_time import one_at_a_time
 from grimaldi.options import checked_options, describe
 
 if TYPE_CHECKING:
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
 Summed = dict[tuple[int, ...], NDArray[Any]]  # numbers of all points, by wavelength or by that and group
 
 
+@one_at_a_time
 def field(
     scene: Any,
     points: ArrayLike,

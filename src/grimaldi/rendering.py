@@ -14,6 +14,7 @@ import numpy as np
 from grimaldi.conventions import check_options
 from grimaldi.errors import GrimaldiWarning, InputError
 from grimaldi.film.layers import Layers
+from grimaldi.one_at_a_time import one_at_a_time
 from grimaldi.options import describe
 
 if TYPE_CHECKING:
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
 SAMPLES = 1 << 20  # a pixel, at most
 
 
+@one_at_a_time
 def render(
     scene: Any,
     *,
@@ -214,7 +216,7 @@ def _side_by_side(scene: Scene, light: Light, settings: Settings, shot: Shot, do
     picture = np.concatenate([tile.picture for tile in done], axis=1)
     lost = sum(tile.lost for tile in done)
     if lost:
-        warnings.warn(f"{lost} samples were not finite and are left out", GrimaldiWarning, stacklevel=4)
+        warnings.warn(f"{lost} samples were not finite and are left out", GrimaldiWarning, stacklevel=5)
     attrs = describe(
         scene,
         diffraction=settings.diffraction,

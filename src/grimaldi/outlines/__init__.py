@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
+from grimaldi.one_at_a_time import one_at_a_time
 from grimaldi.outlines.model import Outline
 from grimaldi.scene.model import Source
 
 
+@one_at_a_time
 def outline(scene: Any, source: Source | str | None = None) -> Outline:
     """The lit outlines that a source of a scene sees.
 

@@ -178,7 +178,7 @@ def _warn_of_shared_edges(mesh: Mesh, name: str) -> None:
             f"{name}: the edge from {start} to {end} is shared by {count[shared[0]]} faces{more}; "
             "its outline may be wrong there",
             GrimaldiWarning,
-            stacklevel=5,
+            stacklevel=6,
         )
 
 

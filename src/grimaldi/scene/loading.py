@@ -11,6 +11,7 @@ from typing import Any
 
 from grimaldi.conventions import did_you_mean
 from grimaldi.errors import GrimaldiWarning, InputError
+from grimaldi.one_at_a_time import one_at_a_time
 from grimaldi.scene.bodies import blockers, sort_shapes
 from grimaldi.scene.checking import check_nodes, check_scene
 from grimaldi.scene.instances import write_out
@@ -23,6 +24,7 @@ from grimaldi.scene.sources import sources
 from grimaldi.scene.xml import DEEPEST, check_xml
 
 
+@one_at_a_time
 def load(
     scene: Any,
     *,
@@ -116,7 +118,7 @@ def _read(scene: Any, coherent: Collection[str]) -> Scene:
         shapes = sort_shapes(mi_scene.shapes())
         found = sources(mi_scene, coherent=coherent)
     if shapes.others:
-        warnings.warn(f"{', '.join(shapes.others)}: does not diffract yet", GrimaldiWarning, stacklevel=3)
+        warnings.warn(f"{', '.join(shapes.others)}: does not diffract yet", GrimaldiWarning, stacklevel=4)
     return Scene(
         name=name,
         mitsuba=mi_scene,
@@ -177,7 +179,7 @@ def _from_pbrt(path: Path) -> tuple[Any, str | None]:
     scene, left_out = pbrt.read(path)
     if left_out:
         what = ", ".join(f"{name} (line {line})" for name, line in left_out.items())
-        warnings.warn(f"{path.name}: left out: {what}", GrimaldiWarning, stacklevel=5)
+        warnings.warn(f"{path.name}: left out: {what}", GrimaldiWarning, stacklevel=6)
     return _from_dict(scene)
 
 
