@@ -227,9 +227,18 @@ def test_polygons_in_ply(tmp_path, form, faces):
     np.testing.assert_allclose(factor(LAMP, ACROSS, ply(tmp_path / "x.ply", faces, form), **FINE), masked(), atol=1e-6)
 
 
+TRIANGLES_FROM_THE_END = "f  -5 -4 -3\nf 1 -3 -2\nf 1 4 -1"
+
+
 @pytest.mark.parametrize(
     "lines",
-    ["f 1 2 3 4 5", "f 1/1/1 2/1/1 3/1/1 4/1/1\nf 1//1 4//1 5//1", "f -5 -4 -3 -2 -1", "o a\nf 1 2 3 4\no b\nf 1 4 5"],
+    [
+        "f 1 2 3 4 5",
+        "f 1/1/1 2/1/1 3/1/1 4/1/1\nf 1//1 4//1 5//1",
+        "f -5 -4 -3 -2 -1",
+        TRIANGLES_FROM_THE_END,
+        "o a\nf 1 2 3 4\no b\nf 1 4 5",
+    ],
 )
 def test_polygons_in_obj(tmp_path, lines):
     np.testing.assert_allclose(factor(LAMP, ACROSS, obj(tmp_path / "x.obj", lines), **FINE), masked(), atol=1e-6)

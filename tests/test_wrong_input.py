@@ -7,7 +7,9 @@ import subprocess
 import sys
 import zlib
 from collections.abc import Sequence
+from importlib import import_module
 from pathlib import Path
+from pkgutil import iter_modules
 from typing import Any
 
 import mitsuba as mi
@@ -15,6 +17,8 @@ import numpy as np
 import pytest
 
 import grimaldi
+import grimaldi.plugins
+from grimaldi.conventions import PLUGINS
 from grimaldi.errors import GrimaldiWarning, InputError
 
 HEADER = (
@@ -177,6 +181,7 @@ MIRRORED = '<transform name="to_world"><scale x="-1"/></transform>'
         ('<shape type="sphere">\n<shap', "scene.xml, line 4: malformed XML"),
         ('<shape type="sphere"/></shape>', "scene.xml, line 2: malformed XML"),
         ('<shape type="spher"/>', "scene.xml, line 2: unknown plugin 'spher'; did you mean 'sphere'?"),
+        ('<shape type="gltff"/>', "line 2: unknown plugin 'gltff'; did you mean 'gltf'"),
         (
             '\n<emitter type="coherent_pint"/>',
             "line 3: unknown plugin 'coherent_pint'; did you mean 'coherent_point'",
@@ -372,6 +377,23 @@ def test_variants_without_waves_are_refused(variant):
     mi.set_variant(variant)
     with pytest.raises(InputError, match=f"^variant {variant}: waves need an llvm or cuda variant"):
         grimaldi.render("young", spp=1, size=(8, 8))
+
+
+def test_plugins_that_messages_suggest_are_those_that_are_registered():
+    """Of which they know the names alone."""
+    names: list[str] = []
+
+    class Variant:
+        """One that registers nothing, but notes its name."""
+
+        def __getattr__(self, name: str) -> Any:
+            if name.startswith("register_"):
+                return lambda plugin, _: names.append(plugin)
+            return getattr(mi.llvm_ad_rgb, name)
+
+    for module in iter_modules(grimaldi.plugins.__path__):
+        getattr(import_module(f"grimaldi.plugins.{module.name}"), "register", lambda _: None)(Variant())
+    assert sorted(names) == sorted(PLUGINS)
 
 
 # ------------------------------------------------------------------------------------- the command

@@ -18,6 +18,17 @@ SIGNS = "exp(-i omega t): U = A exp(i phase) exp(+i k R)/R, so phase grows with 
 
 Wavelength = float | str | Sequence[float | str]
 ModelName = Literal["none", "boundary", "huygens", "area"]
+PLUGINS = (  # what `grimaldi.plugins` adds to Mitsuba's
+    "aperture",
+    "coherent_area",
+    "coherent_directional",
+    "coherent_point",
+    "cone",
+    "gltf",
+    "polygons",
+    "stl",
+    "wave",
+)
 
 _SHORTEST, _LONGEST = 1e-18, 1e18  # scene units; beyond them phases overflow or divide by zero
 

@@ -6,7 +6,7 @@ import re
 from functools import cache
 from pathlib import Path
 
-from grimaldi.conventions import did_you_mean
+from grimaldi.conventions import PLUGINS, did_you_mean
 
 _SOURCE_LINE = re.compile(r"\[[\w.]+\.(?:cpp|h|inl):\d+\]\s*")
 _CLASS = re.compile(r"\[[A-Z]\w+\] ")
@@ -71,11 +71,8 @@ def _what(text: str) -> str:
 
 @cache
 def _plugin_names() -> tuple[str, ...]:
-    """Mitsuba's plugins, one shared library each, and Grimaldi's, one module each."""
+    """Mitsuba's plugins, one shared library each, and Grimaldi's."""
     import mitsuba as mi
 
-    import grimaldi.plugins
-
     libraries = (Path(str(mi.__file__)).parent / "plugins").iterdir()
-    own = Path(str(grimaldi.plugins.__file__)).parent.glob("[!_]*.py")
-    return tuple(sorted({file.name.partition(".")[0] for file in (*libraries, *own)} - {"parameters"}))
+    return tuple(sorted({file.name.partition(".")[0] for file in libraries} | {*PLUGINS}))

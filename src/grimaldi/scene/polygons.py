@@ -68,8 +68,15 @@ def read_obj(path: Path) -> tuple[Reals, list[list[int]]]:
 
     Raises InputError naming the line that is no vertex or face.
     """
+    points, polygons, _ = _obj(path)
+    return points, polygons
+
+
+def _obj(path: Path) -> tuple[Reals, list[list[int]], bool]:
+    """The same, and whether a face counts vertices from the end."""
     points: list[list[float]] = []
     polygons: list[list[int]] = []
+    from_end = False
     for number, line in enumerate(_text(path).splitlines(), start=1):
         words = line.split("#")[0].split()
         try:
@@ -80,6 +87,7 @@ def read_obj(path: Path) -> tuple[Reals, list[list[int]]]:
                         raise ValueError
                 case ["f", *corners]:
                     polygons.append([_index(corner, len(points)) for corner in corners])
+                    from_end |= any(corner.startswith("-") for corner in corners)
         except ValueError:
             raise InputError(
                 f"{path}, line {number}: {line.strip()[:60]!r} is no OBJ line; export the mesh anew"
@@ -90,14 +98,14 @@ def read_obj(path: Path) -> tuple[Reals, list[list[int]]]:
     array = np.array(points, np.float64).reshape(-1, 3)
     if not polygons:
         raise InputError(f"{path}: the mesh is empty; give it at least one triangle")
-    return array, polygons
+    return array, polygons, from_end
 
 
 def check_obj(path: Path) -> bool:
     """Whether an OBJ file has polygons or counts vertices from the end; InputError where it is wrong."""
-    points, polygons = read_obj(path)
+    points, polygons, from_end = _obj(path)
     check_triangles(points, triangles(points, polygons, str(path)), str(path))
-    return any(len(polygon) != 3 for polygon in polygons) or "f -" in _text(path)
+    return from_end or any(len(polygon) != 3 for polygon in polygons)
 
 
 def _index(corner: str, count: int) -> int:
