@@ -166,10 +166,8 @@ def test_a_page_keeps_the_rows_of_the_same_machine_that_are_not_measured_anew(tm
 
 def test_runs_take_turns_after_one_untimed():
     order: list[str] = []
-    first, second = medians(2, lambda: order.append("a"), lambda: order.append("b"))
+    medians(2, lambda: order.append("a"), lambda: order.append("b"))
     assert order == ["a", "b"] * 3
-    assert first >= 0
-    assert second >= 0
 
 
 def test_a_long_picture_is_not_run_again():

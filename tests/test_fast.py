@@ -26,6 +26,7 @@ from grimaldi.diffraction.model import LEFT, OUTSIDE, UP, Options, Receivers
 from grimaldi.diffraction.reach import reach
 from grimaldi.engine.blocks import Sight, squares
 from grimaldi.light import Settings, prepare
+from grimaldi.scene.model import Scene
 
 mi: Any = mitsuba
 mi.set_variant("llvm_ad_rgb")
@@ -71,7 +72,7 @@ def test_no_point_of_a_sphere_has_a_smaller_detour_than_its_bound():
 
 
 @pytest.fixture(scope="module")
-def crowd() -> tuple[grimaldi.Scene, Reals]:
+def crowd() -> tuple[Scene, Reals]:
     """Eight hundred bodies over a floor, and points of it under their middle."""
     return grimaldi.load(scenes.bodies(800, seed=4, joined=True)), scenes.floor_points(400, seed=4)
 

@@ -12,6 +12,7 @@ import numpy as np
 import oracle
 import pytest
 from optics import affine, factor, mesh, shape
+from scipy.spatial import ConvexHull
 
 from grimaldi.diffraction.knife_edge import amplitude
 from grimaldi.errors import InputError
@@ -120,11 +121,10 @@ def test_a_disc_behind_a_disc(radius):
 
 def ball(folder, n=12):
     """A convex mesh, its corners on a sphere of radius 8."""
-    hull = pytest.importorskip("scipy.spatial").ConvexHull
     i = np.arange(n * n) + 0.5
     z, turn = 1 - 2 * i / (n * n), np.pi * (1 + np.sqrt(5)) * i
     corners = 8 * np.stack([np.sqrt(1 - z * z) * np.cos(turn), np.sqrt(1 - z * z) * np.sin(turn), z], axis=1)
-    return mesh(folder / "ball.obj", corners, hull(corners).simplices)
+    return mesh(folder / "ball.obj", corners, ConvexHull(corners).simplices)
 
 
 @pytest.mark.parametrize("kind", ["sphere", "disk", "cube", "cylinder", "mesh"])

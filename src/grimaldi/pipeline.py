@@ -63,8 +63,8 @@ def field(
         epsilon: how far beside an edge the silhouette test of "report" looks [scene units]; 2e-4 of the body's size
             unless given.
         fast: whether "boundary" may sum points on a plane behind holes or masks by one non-uniform FFT (Barnett,
-            JATIS 7(2) 021211) where the bound of its error is within `tolerance` and it is expected to be faster.
-            False: always along the outlines.
+            JATIS 7(2) 021211) where the bound of its error, or an estimate from 16 of the points, is within
+            `tolerance` and it is expected to be faster. False: always along the outlines.
         smooth: levels by which meshes with vertex normals are divided, as in `grimaldi.load`.
 
     Returns:

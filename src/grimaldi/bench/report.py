@@ -20,7 +20,7 @@ INTRO = """# Performance
 
 Every figure beside its yardstick, timed in the same run and in turn with it, written by
 
-    grimaldi bench -o docs
+    grimaldi bench -o FOLDER
 
 Times are medians of as many runs as `--runs` of a row says, after one untimed run, unless the row says otherwise.
 A row stays as of its day until it is measured anew, as long as machine and versions are the same. Times of two

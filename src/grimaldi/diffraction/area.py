@@ -19,7 +19,7 @@ import numpy as np
 
 from grimaldi.diffraction import none
 from grimaldi.diffraction.arrays import types
-from grimaldi.diffraction.frame import constant
+from grimaldi.diffraction.frame import HORIZON, constant
 from grimaldi.diffraction.model import NYQUIST, Evaluate, Factor, Options, Receivers
 from grimaldi.diffraction.occlusion import Rays, rays
 from grimaldi.diffraction.screen import beyond
@@ -34,7 +34,6 @@ mi: Any = mitsuba  # the stubs refuse numbers where arrays are asked for
 
 CELL = 0.5  # wavelengths: the phase k(r+s) turns at most once over it
 MOST = 4_000_000  # nodes, 256 MB
-HORIZON = 1e-4  # as in `edges.sounds`
 
 
 class Kernel(NamedTuple):

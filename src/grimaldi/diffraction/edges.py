@@ -13,7 +13,7 @@ import numpy as np
 
 from grimaldi.diffraction.arrays import on_device
 from grimaldi.diffraction.chains import Chain, Passed, ahead, basis, chain_wave, crossing, exact
-from grimaldi.diffraction.frame import ROUNDINGS, Frame, constant
+from grimaldi.diffraction.frame import HORIZON, ROUNDINGS, Frame, constant
 from grimaldi.diffraction.grazing import Near, grazed, other_than, worth
 from grimaldi.diffraction.hierarchy import NONE, least_detour
 from grimaldi.diffraction.model import Receivers
@@ -98,7 +98,7 @@ def sounds(fr: Frame, piece: Piece, n: Any) -> Any:
     length = dr.norm(d)
     free = dr.squared_norm(n) == 0
     aside = 2 * ROUNDINGS * dr.epsilon(length) * fr.lever  # by which the ray was moved, P with it
-    above = free | (dr.dot(n, d) < -1e-4 * length - aside)
+    above = free | (dr.dot(n, d) < -HORIZON * length - aside)
     behind = (piece.closed > 0.5) | (dr.dot(piece.lit, d) < -1e-6 * length)
     return above & behind
 

@@ -16,6 +16,7 @@ from grimaldi.scene.planar import PlanarOutline
 if TYPE_CHECKING:
     from grimaldi.diffraction.table import Table
 
+HORIZON = 1e-4  # sine of the angle over a receiver's surface, above which it hears what an outline sends
 ROUNDINGS = 32  # by which a ray is moved aside: what edges that meet in a corner may differ in
 ASIDE = (0.36161, 0.48757, 0.79467)  # no direction in which people place corners
 

@@ -88,8 +88,8 @@ def fresnel_plane(
 ) -> Evaluate | None:
     """M of the model `boundary` at points (n, 3) of one of `planes`, its lattice with them.
 
-    Returns a function of exactly these points, in their order. None where the error's bound exceeds the tolerance,
-    or where the line integral is expected to be faster.
+    Returns a function of exactly these points, in their order. None where neither the error's bound nor an estimate
+    of it is within the tolerance, or where the line integral is expected to be faster.
     """
     plane = Plane.of(Screen.of(scene, source, k), points, grid)
     screen = plane.screen

@@ -21,7 +21,7 @@ import drjit as dr
 import numpy as np
 
 from grimaldi.diffraction.arrays import Types
-from grimaldi.diffraction.frame import Frame
+from grimaldi.diffraction.frame import HORIZON, Frame
 from grimaldi.diffraction.hierarchy import NONE, Tree, flat, layout, least_detour
 from grimaldi.diffraction.knife_edge import amplitude
 from grimaldi.diffraction.model import Receivers
@@ -141,7 +141,7 @@ def near(fr: Frame, silhouettes: Chords, k: float, receivers: Receivers, room: A
             chord = silhouettes.chord(item)
             at = passing(fr, chord, k, room)
             x = chord.start + at.t * chord.e - p
-            rises = everywhere | (dr.dot(n, x) > 1e-4 * dr.norm(x))
+            rises = everywhere | (dr.dot(n, x) > HORIZON * dr.norm(x))
             v2_j = dr.select(rises, at.v2, dr.inf)
             other = chord.body != body
             closest = v2_j < v2

@@ -84,8 +84,8 @@ def register(V: Any) -> None:
 
          * - coherent
            - |string|
-           - Ids of :monosp:`point` and :monosp:`directional` lights that join coherence group "0", separated by
-             commas; each is a group of its own otherwise. (Default: none)
+           - Ids of :monosp:`point`, :monosp:`directional` and :monosp:`spot` lights that join coherence group "0",
+             separated by commas; each is a group of its own otherwise. (Default: none)
 
          * - groups
            - |string|

@@ -43,7 +43,7 @@ def load(
         scene_unit: length of one scene unit, such as "1 um". Otherwise that of the scene itself: in XML
             `<string name="scene_unit" value="1 um"/>` directly in `<scene>`, in a dictionary the key
             "scene_unit" beside "type".
-        coherent: ids of Mitsuba's `point` and `directional` lights that join coherence group "0".
+        coherent: ids of Mitsuba's `point`, `directional` and `spot` lights that join coherence group "0".
         smooth: levels, 0 to 6, by which meshes with vertex normals are divided into the curved surfaces that these
             stand for, each face into 4^smooth: for the camera, for rays, and for outlines.
 

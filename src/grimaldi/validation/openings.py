@@ -118,7 +118,7 @@ def several_slits() -> Case:
 
 
 def _slits(name: str, count: int) -> Case:
-    """Slits a hundred widths long: their length is the other factor of the product."""
+    """Slits 12.5 widths long: their length is the other factor of the product."""
     z, tolerance = 1e11, 1e-8
     width, spacing = 0.8 * np.sqrt(z), 2 * np.sqrt(z)
     length = 10 * np.sqrt(z)

@@ -17,7 +17,7 @@ IMAGES = Path("images") / "accuracy"
 
 INTRO = """# Accuracy
 
-Every closed form in `grimaldi.reference` against `grimaldi.field`, written by
+Closed forms of `grimaldi.reference` against `grimaldi.field`, written by
 
     grimaldi validate -o docs
 
