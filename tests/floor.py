@@ -14,7 +14,8 @@ from grimaldi.bench import scenes
 from grimaldi.engine.asking import Recordings, ask
 from grimaldi.engine.blocks import Sight, Squares, squares
 from grimaldi.engine.tiles import Shot, sight
-from grimaldi.light import Settings, prepare
+from grimaldi.light import prepare
+from grimaldi.options import Settings
 
 mi: Any = mitsuba
 

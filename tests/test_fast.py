@@ -25,7 +25,8 @@ from grimaldi.diffraction.lists import FINELY, INNER, List, Parts
 from grimaldi.diffraction.model import LEFT, OUTSIDE, UP, Options, Receivers
 from grimaldi.diffraction.reach import reach
 from grimaldi.engine.blocks import Sight, squares
-from grimaldi.light import Settings, prepare
+from grimaldi.light import prepare
+from grimaldi.options import Settings
 from grimaldi.scene.model import Scene
 
 mi: Any = mitsuba

@@ -15,7 +15,8 @@ from optics import GREY, affine, emitter, shape
 import grimaldi
 from grimaldi.engine.hits import Hits, hits
 from grimaldi.engine.tiles import Shot, render_tile
-from grimaldi.light import Settings, prepare
+from grimaldi.light import prepare
+from grimaldi.options import Settings
 
 mi: Any = mitsuba  # the stubs refuse numbers where arrays are asked for
 mi.set_variant("llvm_ad_rgb")

@@ -12,7 +12,8 @@ import grimaldi
 from grimaldi.engine import progress as module
 from grimaldi.engine.asking import work
 from grimaldi.engine.progress import progress
-from grimaldi.light import Settings, prepare
+from grimaldi.light import prepare
+from grimaldi.options import Settings
 from grimaldi.variants import ensure_variant
 
 

@@ -12,7 +12,8 @@ import grimaldi
 from grimaldi import light
 from grimaldi.engine.tiles import Shot, bands, render_tile
 from grimaldi.errors import InputError
-from grimaldi.light import Settings, prepare
+from grimaldi.light import prepare
+from grimaldi.options import Settings
 
 mi: Any = mitsuba  # the stubs refuse numbers where arrays are asked for
 mi.set_variant("llvm_ad_rgb")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from hashlib import blake2b
@@ -14,22 +13,22 @@ import numpy as np
 
 from grimaldi.camera import seen
 from grimaldi.coherence import groups, separated
-from grimaldi.conventions import Wavelength, parse_wavelengths
+from grimaldi.conventions import parse_wavelengths
 from grimaldi.diffraction import model
 from grimaldi.diffraction.arrays import types
 from grimaldi.diffraction.boundary import boundary
 from grimaldi.diffraction.frame import toward
-from grimaldi.diffraction.model import Evaluate, Factor, Options, Receivers
+from grimaldi.diffraction.model import Evaluate, Factor, Receivers
 from grimaldi.diffraction.none import none
 from grimaldi.engine.asking import Recordings
 from grimaldi.engine.hits import Hits, hits
 from grimaldi.engine.judging import Shares
 from grimaldi.errors import InputError
-from grimaldi.options import checked_options
+from grimaldi.options import Settings
 from grimaldi.outlines.memory import once
 from grimaldi.propagate import Wave, carrier, factor
-from grimaldi.scene.bodies import indices, vertices
-from grimaldi.scene.model import Mesh, Scene, Source
+from grimaldi.scene.bodies import vertices
+from grimaldi.scene.model import Scene, Source
 from grimaldi.syntax import syntax
 
 INTERPOLATED = 0.1, 5e-4, 0.037  # of a strict tolerance, at most; then of a loose one (`_shares`)
@@ -37,36 +36,6 @@ MOST = 0.5  # of the tolerance, to interpolation
 RAYS = 0.08, 0.012  # of the tolerance, and at most: |M - M of a ray|, where pictures show a ray's
 ROUNDINGS = 12  # of Float32, of the largest coordinate: what Mitsuba's points are off by, and paths to them
 PHASE = 0.125  # of the tolerance, that they may be in phase
-
-
-@dataclass(frozen=True)
-class Settings:
-    """What the integrator `wave` was asked for; see its manual page."""
-
-    wavelength: Wavelength | None = None
-    scene_unit: str | None = None
-    diffraction: str = "boundary"
-    interference: bool = True
-    tolerance: float = 1e-3
-    precision: str = "auto"
-    occlusion: bool | str = True
-    rim: str = "sharp"
-    n: int | str | None = None
-    weights: str = "report"
-    epsilon: float | None = None
-    fast: bool = True
-    coherent: tuple[str, ...] = ()
-
-    def check(self) -> None:
-        """Raise InputError for what is wrong whatever the scene."""
-        model(self.diffraction)
-        self.options()
-
-    def options(self) -> Options:
-        """The options of the model."""
-        return checked_options(
-            self.tolerance, self.precision, self.occlusion, self.n, self.weights, self.epsilon, self.rim, self.fast
-        )
 
 
 class Beam(NamedTuple):
@@ -88,7 +57,6 @@ class Light:
     beams: tuple[Beam, ...]
     keys: tuple[tuple[float, str], ...]
     shares: tuple[Shares, ...]  # for each beam, what may be left of M over the film; none where M is always asked for
-
     asks: bool  # whether the model does more for M than to trace a ray
     rounding: float | None  # rad, of U's phase at Mitsuba's own points, where that is within the tolerance
 
@@ -176,7 +144,7 @@ def prepare(scene: Scene, settings: Settings) -> Light:
     keys = tuple((wavelength, group) for wavelength in wavelengths for group in groups(sources))
     of = settings.diffraction, options, blake2b(where.tobytes(), digest_size=16).digest()
 
-    def beam(wavelength: float, source: Source) -> Beam:
+    def made(wavelength: float, source: Source) -> Beam:
         k = 2 * np.pi / wavelength
         return Beam(
             source,
@@ -186,7 +154,7 @@ def prepare(scene: Scene, settings: Settings) -> Light:
             once(scene, ("recordings", source, k, *of), Recordings),
         )
 
-    beams = tuple(beam(wavelength, source) for wavelength in wavelengths for source in sources)
+    beams = tuple(made(wavelength, source) for wavelength in wavelengths for source in sources)
     interpolates = options.fast and chosen is boundary
     shares = tuple(_shares(beams, beam, options.tolerance) for beam in beams) if interpolates else ()
     rounding = 2 * np.pi / min(wavelengths) * ROUNDINGS * 2.0**-24 * _reach(scene)
@@ -211,53 +179,8 @@ def _shares(beams: Sequence[Beam], beam: Beam, tolerance: float) -> Shares:
     return Shares(missed, MOST * tolerance, rays, 0.0 if alone else 1.0)
 
 
-class LightOf:
-    """The light of a Mitsuba scene, prepared anew when its bodies or sources have changed.
-
-    A plain object, so that Mitsuba does not look for parameters in it.
-    """
-
-    def __init__(self, settings: Settings) -> None:
-        self.settings = settings
-        self._key = b""
-        self._light: Light | None = None
-
-    def __call__(self, scene: Any) -> Light:
-        from grimaldi.scene import load
-
-        with warnings.catch_warnings(record=True) as said:
-            warnings.simplefilter("always")
-            loaded = load(scene, coherent=self.settings.coherent)
-        key = fingerprint(loaded)
-        if self._light is None or key != self._key:
-            for warning in said:
-                warnings.warn(warning.message, stacklevel=2)
-            self._key, self._light = key, prepare(loaded, self.settings)
-        return self._light
-
-
 def _tint(source: Source) -> Any:
     """The light's colour as a weight of the channels."""
     if dr.size_v(mi.UnpolarizedSpectrum) == 1:
         return mi.UnpolarizedSpectrum(1)
     return mi.UnpolarizedSpectrum(*source.tint)
-
-
-def fingerprint(scene: Scene) -> bytes:
-    """Changes when a shape, a source or a camera does, and from one Mitsuba scene to the next."""
-    digest = blake2b(digest_size=16)
-    digest.update(indices(scene.mitsuba).tobytes())
-    for surface in scene.surfaces:
-        digest.update(b"-" if surface is None else np.ascontiguousarray(vertices(surface)).tobytes())
-        if isinstance(surface, Mesh):
-            digest.update(np.ascontiguousarray(surface.faces).tobytes())
-    for planar in (*scene.screen, *(s.aperture for s in scene.sources if s.aperture is not None)):
-        digest.update(np.concatenate([*planar.loops, planar.to_world[:, :2]], axis=None).tobytes())
-    for s in scene.sources:
-        digest.update(repr((s.name, s.group, s.amplitude, s.phase, s.tint)).encode())
-        for v in (s.position, s.direction, s.origin):
-            digest.update(b"-" if v is None else v.tobytes())
-        digest.update(repr(s.spot and (s.spot.axis.tolist(), s.spot.beam_width, s.spot.cutoff)).encode())
-    for sensor in scene.mitsuba.sensors():
-        digest.update(repr((sensor.world_transform(), sensor.film().crop_size())).encode())
-    return digest.digest()

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any, get_args
 
-from grimaldi.conventions import SIGNS, did_you_mean
+from grimaldi.conventions import SIGNS, Wavelength, did_you_mean
 from grimaldi.errors import InputError
 
 if TYPE_CHECKING:
@@ -16,15 +17,47 @@ if TYPE_CHECKING:
 MOST = 1 << 24  # sources an edge, or samples a point
 
 
+@dataclass(frozen=True)
+class Settings:
+    """What the integrator `wave` was asked for; see its manual page."""
+
+    wavelength: Wavelength | None = None
+    scene_unit: str | None = None
+    diffraction: str = "boundary"
+    interference: bool = True
+    tolerance: float = 1e-3
+    precision: str = "auto"
+    occlusion: bool | str = True
+    rim: str = "sharp"
+    n: int | str | None = None
+    weights: str = "report"
+    epsilon: float | None = None
+    fast: bool = True
+    coherent: tuple[str, ...] = ()
+
+    def check(self) -> None:
+        """Raise InputError for what is wrong whatever the scene."""
+        from grimaldi.diffraction import model
+
+        model(self.diffraction)
+        self.options()
+
+    def options(self) -> Options:
+        """The options of the model."""
+        return checked_options(
+            tolerance=self.tolerance,
+            precision=self.precision,
+            occlusion=self.occlusion,
+            rim=self.rim,
+            n=self.n,
+            weights=self.weights,
+            epsilon=self.epsilon,
+            fast=self.fast,
+        )
+
+
 def checked_options(
-    tolerance: Any,
-    precision: Any,
-    occlusion: Any = True,
-    n: Any = None,
-    weights: Any = "report",
-    epsilon: Any = None,
-    rim: Any = "sharp",
-    fast: Any = True,
+    *, tolerance: Any, precision: Any, occlusion: Any, rim: Any, n: Any, weights: Any, epsilon: Any, fast: Any
 ) -> Options:
     """The options of every model; InputError names the one that is wrong."""
     from grimaldi.diffraction.model import NYQUIST, Occlusion, Options, Precision, Rim, Weights

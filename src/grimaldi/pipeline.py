@@ -90,7 +90,16 @@ def field(
 
     check_options(unknown, signature(field).parameters)
     p = checked_points(points)
-    options = checked_options(tolerance, precision, occlusion, n, weights, epsilon, rim, fast)
+    options = checked_options(
+        tolerance=tolerance,
+        precision=precision,
+        occlusion=occlusion,
+        rim=rim,
+        n=n,
+        weights=weights,
+        epsilon=epsilon,
+        fast=fast,
+    )
     factor = model(diffraction)
     loaded = load(scene, scene_unit=scene_unit, smooth=smooth)
     wavelengths = parse_wavelengths(loaded.wavelength if wavelength is None else wavelength, loaded.unit)

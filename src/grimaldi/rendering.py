@@ -15,14 +15,14 @@ from grimaldi.conventions import check_options
 from grimaldi.errors import GrimaldiWarning, InputError
 from grimaldi.film.layers import Layers
 from grimaldi.one_at_a_time import one_at_a_time
-from grimaldi.options import describe
+from grimaldi.options import Settings, describe
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from grimaldi.engine.means import Tile
     from grimaldi.engine.tiles import Shot
-    from grimaldi.light import Light, Settings
+    from grimaldi.light import Light
     from grimaldi.scene.model import Scene
 
 SAMPLES = 1 << 20  # a pixel, at most
@@ -148,8 +148,6 @@ def _integrator(scene: Scene) -> Any:
 
 
 def _settings(own: Any) -> Settings:
-    from grimaldi.light import Settings
-
     return Settings() if own is None else own.light_of.settings
 
 

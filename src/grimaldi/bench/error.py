@@ -93,7 +93,8 @@ def reference(scene: Scene, wavelength: float, film: Film, patience: float = PAT
     M is asked for at every sample. Where all strips take longer than `patience` [s], it is at those done by then.
     """
     from grimaldi.engine.tiles import render_tile
-    from grimaldi.light import Settings, prepare
+    from grimaldi.light import prepare
+    from grimaldi.options import Settings
     from grimaldi.rendering import resized, shot_of
 
     sensor = scene.mitsuba.sensors()[0]

@@ -103,7 +103,8 @@ def register(V: Any) -> None:
 
         def __init__(self, props: Any) -> None:
             V.SamplingIntegrator.__init__(self, props)
-            from grimaldi.light import LightOf, Settings
+            from grimaldi.light_of import LightOf
+            from grimaldi.options import Settings
 
             self.max_depth = parameters.depth(props, "max_depth", 2, least=0)
             self.rr_depth = parameters.depth(props, "rr_depth", 5, least=1)
