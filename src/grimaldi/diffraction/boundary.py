@@ -213,7 +213,7 @@ def unoccluded(problem: Problem, precision: Types) -> tuple[int, Callable[[Any, 
         fr = frame(problem.source, p, tab)
         piece = tab.piece(i)
         acts = sounds(fr, piece, dr.zeros(precision.Vector, dr.width(p)))
-        wave = chain_wave(fr, tab, piece.first, piece.end, k, rule, None, False, acts).wave
+        wave = chain_wave(fr, tab, piece.first, piece.end, k, rule, acts).wave
         scale = dr.select(acts, 0.5 / np.pi, 0)
         return least_detour(fr, piece.middle, 0), scale * wave.real, scale * wave.imag
 
@@ -232,6 +232,8 @@ class _Bodies:
         tolerance = options.tolerance
         self.problem = problem
         self.rule = problem.rule()
+        if options.rim == "smooth":
+            self.rule = self.rule._replace(corners=None, damped=True)
         self.rays = rays(scene, source, outline.sag)
         self.tab = problem.packed.on(precision, AS_ONE * tolerance, problem.k)
         self.k = self.tab.device(problem.k)
@@ -261,8 +263,7 @@ class _Bodies:
 
     def _sum(self, fr: Frame, walk: Walk, beside: Near | None, receivers: Receivers) -> tuple[Sum, Nearest, Margins]:
         options = self.problem.options
-        smooth = options.rim == "smooth"
-        return body_sum(fr, self.tab, walk, self.k, self.rule, options.tolerance, self.probe, beside, smooth, receivers)
+        return body_sum(fr, self.tab, walk, self.k, self.rule, options.tolerance, self.probe, beside, receivers)
 
     def _factor(self, fr: Frame, receivers: Receivers, found: tuple[Sum, Nearest, Margins]) -> Factor:
         sums, nearest, margins = found

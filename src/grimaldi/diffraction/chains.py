@@ -44,12 +44,12 @@ def exact(fr: Frame, tab: Table, k: Any = None) -> tuple[Frame, Table, Any]:
 
 @syntax
 def chain_wave(
-    fr: Frame, tab: Table, first: Any, end: Any, k: Any, rule: Rule, passed: Passed | None, smooth: bool, active: Any
+    fr: Frame, tab: Table, first: Any, end: Any, k: Any, rule: Rule, active: Any, passed: Passed | None = None
 ) -> Chain:
     """Σ ∫ C e^{ikΔ} dφ over the segments first..end, neighbours of one another; each corner is looked at once."""
     F = tab.types.Float
     U = dr.uint32_array_t(F)
-    by_corners = rule.corners is not None and not smooth
+    by_corners = rule.corners is not None
     forms = rule.corners or NEVER
     real, imag, err_real, err_imag, rounding2 = F(0), F(0), F(0), F(0), F(0)
     distance2, segment, receiver2, n = F(dr.inf), U(first), F(dr.inf), F(0)
@@ -73,7 +73,7 @@ def chain_wave(
                 whole &= ~serves
                 wave = re, im, F(0), F(0), F(0)
         if whole:
-            full, d2, p2, turn = _whole(fr, tab, j, k, rule, smooth, whole)
+            full, d2, p2, turn = _whole(fr, tab, j, k, rule, whole)
             wave = tuple(full)
         n += crossing(dr.dot(a.q, across), dr.dot(b.q, across), turn)
         if dr.hint(passed is not None, mode="scalar"):
@@ -97,14 +97,14 @@ def _corner(fr: Frame, tab: Table, j: Any, end: int, k: Any) -> Corner:
     return corner(finer, there.corner(j, end), k, tab.types if tab.exact else None)
 
 
-def _whole(fr: Frame, tab: Table, j: Any, k: Any, rule: Rule, smooth: bool, active: Any) -> tuple[Wave, Any, Any, Any]:
+def _whole(fr: Frame, tab: Table, j: Any, k: Any, rule: Rule, active: Any) -> tuple[Wave, Any, Any, Any]:
     """A segment's wave by the whole integral, the squared distances of the ray and of P to it, and κ."""
     F = tab.types.Float
     fr, tab, k = exact(fr, tab, k)
     seg = tab.segment(j)
     ln = line(fr, seg.X0, seg.e)
     wave = segment_wave(fr, ln, seg.length, k, rule, active)
-    if smooth:
+    if rule.damped:
         wave = damped(wave, fr, ln, seg.length, seg.radius, k)
     return Wave(*map(F, wave)), F(closest(fr, seg, ln)), F(to_receiver(fr, seg, ln)), F(ln.kappa)
 

@@ -125,7 +125,7 @@ class Samples(NamedTuple):
 def sampled(fr: Frame, tab: Table, k: Any, rule: Rule, piece: Any) -> Samples:
     """What pieces send along the rays of frames, one each; evaluated."""
     first, end = tab.range(piece)
-    chain = chain_wave(fr, tab, first, end, k, rule, None, False, dr.mask_t(k)(True))
+    chain = chain_wave(fr, tab, first, end, k, rule, dr.mask_t(k)(True))
     middle, _ = tab.sphere(piece)
     turns = k / (2 * np.pi)
     spread = turns * (least_detour(fr, tab.corner(end - 1, 1), 0) - least_detour(fr, tab.corner(first, 0), 0))

@@ -60,7 +60,7 @@ def planar_sum(fr: Frame, tab: Table, k: Any, rule: Rule, active: Any) -> tuple[
     ray2, receiver2, rounding2 = F(dr.inf), F(dr.inf), F(0)
     n, i = F(0), U(0)
     while active & (i < tab.n_pieces):
-        chain = chain_wave(fr, tab, *tab.range(i), k, rule, None, False, active)
+        chain = chain_wave(fr, tab, *tab.range(i), k, rule, active)
         n += chain.n
         real, imag = real + chain.wave.real, imag + chain.wave.imag
         err_real, err_imag = err_real + chain.wave.err_real, err_imag + chain.wave.err_imag
@@ -153,9 +153,7 @@ class Walk(Protocol):
         """What the wave of a piece counts."""
         ...
 
-    def chain(
-        self, fr: Frame, i: Any, piece: Piece, k: Any, rule: Rule, passed: Passed | None, smooth: bool, active: Any
-    ) -> Chain:
+    def chain(self, fr: Frame, i: Any, piece: Piece, k: Any, rule: Rule, passed: Passed | None, active: Any) -> Chain:
         """What the piece at a place sends."""
         ...
 
@@ -206,11 +204,9 @@ class Everywhere(NamedTuple):
         """By how near the ray it lies."""
         return taper(least_detour(fr, piece.middle, 0) / self.table.far)
 
-    def chain(
-        self, fr: Frame, i: Any, piece: Piece, k: Any, rule: Rule, passed: Passed | None, smooth: bool, active: Any
-    ) -> Chain:
+    def chain(self, fr: Frame, i: Any, piece: Piece, k: Any, rule: Rule, passed: Passed | None, active: Any) -> Chain:
         """By its segments."""
-        return chain_wave(fr, self.table, piece.first, piece.end, k, rule, passed, smooth, active)
+        return chain_wave(fr, self.table, piece.first, piece.end, k, rule, active, passed)
 
 
 @syntax
@@ -223,13 +219,11 @@ def body_sum(
     tolerance: float,
     probe: Rays | None,
     beside: Near | None,
-    smooth: bool,
     receivers: Receivers,
 ) -> tuple[Sum, Nearest, Margins]:
     """The sum over the outlines of bodies, piece by piece of a walk, each as far as it reaches the receiver.
 
-    Without a probe none takes a ray. Without silhouettes near by a piece reaches the receiver or does not. `smooth`
-    rims are those with a radius.
+    Without a probe none takes a ray. Without silhouettes near by a piece reaches the receiver or does not.
     """
     F = tab.types.Float
     U = dr.uint32_array_t(F)
@@ -270,7 +264,7 @@ def body_sum(
             weight = walk.weight(fr, piece)
             acts &= weight > 0
             passed = Passed(visible, past_real, past_imag) if beside is not None else None
-            chain = walk.chain(fr, i, piece, k, rule, passed, smooth, acts)
+            chain = walk.chain(fr, i, piece, k, rule, passed, acts)
             real, imag = dr.fma(weight, chain.wave.real, real), dr.fma(weight, chain.wave.imag, imag)
             err_real, err_imag = err_real + chain.wave.err_real, err_imag + chain.wave.err_imag
             rounding2 += chain.wave.rounding2

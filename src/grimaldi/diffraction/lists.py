@@ -156,13 +156,11 @@ class Listed(NamedTuple):
         return 1
 
     @syntax
-    def chain(
-        self, fr: Frame, i: Any, piece: Piece, k: Any, rule: Rule, passed: Passed | None, smooth: bool, active: Any
-    ) -> Chain:
+    def chain(self, fr: Frame, i: Any, piece: Piece, k: Any, rule: Rule, passed: Passed | None, active: Any) -> Chain:
         """By its chirp, or by its segments where it has none."""
         index = dr.gather(mi.UInt32, self.lists.asked_chirps, i, active)
         told = active & (index != NONE)
-        whole = chain_wave(fr, self.table, piece.first, piece.end, k, rule, passed, smooth, active & ~told)
+        whole = chain_wave(fr, self.table, piece.first, piece.end, k, rule, active & ~told, passed)
         real, imag, *rest = whole.wave
         if told:
             re, im = self.lists.chirps.at(index, place(self.receivers))
@@ -286,7 +284,7 @@ def listed_sum(
     active, block, cell = receivers.active, receivers.block, found.cell(receivers)
 
     def tell(first: Any, end: Any, active: Any) -> Chain:
-        return chain_wave(fr, tab, first, end, k, rule, None, False, active)
+        return chain_wave(fr, tab, first, end, k, rule, active)
 
     total: tuple[Any, ...] = (*sums[:5], F(margins.receiver2), F(nearest.distance2), nearest.segment)
     total = _of_parts(total, found, tab, tell, receivers, cell)

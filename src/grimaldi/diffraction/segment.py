@@ -47,7 +47,8 @@ class Rule(NamedTuple):
 
     Up to Y = K by panels of width `stretch` in v with `nodes`, `weights` on 0..1, up to v = `cut`, beyond which nothing
     is left; beyond K by `tail_nodes`, `tail_weights` on 0..∞, to the relative error `tail_error` at K or less. `share`
-    is the error that panels may add to M. `corners` is None where no segment is left to its corners.
+    is the error that panels may add to M. `corners` is None where no segment is left to its corners. `damped`: whether
+    what turns into a smooth body's shadow creeps round it (`creeping`), which whole segments do alone.
     """
 
     K: float
@@ -60,6 +61,7 @@ class Rule(NamedTuple):
     cut: float
     share: float
     corners: Corners | None
+    damped: bool = False
 
     @staticmethod
     def of(tolerance: float) -> Rule:
