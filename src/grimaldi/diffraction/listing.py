@@ -7,7 +7,7 @@ the block is on no list: it takes no part in means over pixels.
 from __future__ import annotations
 
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import drjit as dr
 import mitsuba
@@ -56,20 +56,8 @@ def lists(search: Search, blocks: Blocks) -> Lists:
     kept = seen.open & ~tested & ~dropped
     dr.eval(tested, kept, dropped)
 
-    # runs of neighbours
-    before = dr.maximum(dr.arange(mi.UInt32, len(pairs.index)), 1) - 1
-    follows = dr.gather(mi.Bool, tab.follows, pairs.piece) & (
-        dr.gather(mi.UInt32, pairs.index, before) + 1 == pairs.index
-    )
-    turn = seen.start - dr.gather(mi.Float, seen.stop, before)
-    joint = follows & dropped & dr.gather(mi.Bool, dropped, before) & (dr.abs(turn) < CORNER * limit)
-    dr.eval(joint, follows)
-    begins, stops = dropped & ~joint, dropped & ~_of_next(joint)
-    strong = dr.abs(seen.start) >= CORNER * limit, dr.abs(seen.stop) >= CORNER * limit
-    left2 = dr.select(dropped, seen.inner2, 0) + dr.select(joint, dr.square(turn), 0)
-    left2 += dr.select(begins & ~strong[0], dr.square(seen.start), 0)
-    left2 += dr.select(stops & ~strong[1], dr.square(seen.stop), 0)
-    unit = (CORNER * limit) ** 2 / SQUARES
+    far = _far_runs(tab, pairs, seen, dropped, CORNER * limit)
+    left2, unit = far.left2, (CORNER * limit) ** 2 / SQUARES
     first, end = tab.range(pairs.piece)
     finer = Fine.of(search, blocks)
     verdicts = verdicts_of(search, blocks, finer, pairs, tested, seen.weak, seen.passes)
@@ -84,30 +72,59 @@ def lists(search: Search, blocks: Blocks) -> Lists:
         told = kept & (chirp != NONE)
         left2 += dr.select(told, dr.gather(mi.Float, found.off2, chirp, told) / QUADRANTS, 0)
     left = sums(dr.ceil(left2 / unit), pairs.block, number)
-    dr.eval(begins, stops, first, end, kept)
-    runs, everywhere = _in_quadrants(tab, pairs, number, kept, follows, found)
+    dr.eval(first, end, kept)
+    runs, everywhere = _in_quadrants(tab, pairs, number, kept, far.follows, found)
     asked, asked_chirps, partly, partly_solids, chirped = _in_cells(
         search, blocks, finer, pairs, verdicts, found, seen.passes
     )
     return Lists(
-        dr.opaque(mi.UInt32, number),
-        asked,
-        asked_chirps,
-        partly,
-        partly_solids,
-        found.solids,
-        blocks.boxes,
-        runs,
-        found.chirps,
-        chirped,
-        everywhere,
-        found.clear,
-        found.receiver2,
-        List.of(begins & strong[0], pairs.block, number, first),
-        List.of(stops & strong[1], pairs.block, number, end - 1),
-        dr.sqrt(mi.Float(left) * unit) / (2 * np.pi) + found.left,
-        beside,
+        blocks=dr.opaque(mi.UInt32, number),
+        asked=asked,
+        asked_chirps=asked_chirps,
+        partly=partly,
+        partly_solids=partly_solids,
+        solids=found.solids,
+        boxes=blocks.boxes,
+        runs=runs,
+        chirps=found.chirps,
+        chirped=chirped,
+        everywhere=everywhere,
+        clear=found.clear,
+        receiver2=found.receiver2,
+        begins=List.of(far.begins, pairs.block, number, first),
+        stops=List.of(far.stops, pairs.block, number, end - 1),
+        left=dr.sqrt(mi.Float(left) * unit) / (2 * np.pi) + found.left,
+        beside=beside,
     )
+
+
+class _Far(NamedTuple):
+    """Runs of pairs of which a list has no more than the ends: which begin and stop one that sends something there,
+    the square of what is left out of M at each pair, and which follow the pair before."""
+
+    begins: Any
+    stops: Any
+    left2: Any
+    follows: Any
+
+
+def _far_runs(tab: Table, pairs: Pairs, seen: Seen, dropped: Any, least: float) -> _Far:
+    """Those of the pairs that are dropped; ends and corners that send less than `least` are left out."""
+    before = dr.maximum(dr.arange(mi.UInt32, len(pairs.index)), 1) - 1
+    follows = dr.gather(mi.Bool, tab.follows, pairs.piece) & (
+        dr.gather(mi.UInt32, pairs.index, before) + 1 == pairs.index
+    )
+    turn = seen.start - dr.gather(mi.Float, seen.stop, before)
+    joint = follows & dropped & dr.gather(mi.Bool, dropped, before) & (dr.abs(turn) < least)
+    dr.eval(joint, follows)
+    begins, stops = dropped & ~joint, dropped & ~_of_next(joint)
+    left2 = dr.select(dropped, seen.inner2, 0) + dr.select(joint, dr.square(turn), 0)
+    strong = [dr.abs(end) >= least for end in (seen.start, seen.stop)]
+    left2 += dr.select(begins & ~strong[0], dr.square(seen.start), 0)
+    left2 += dr.select(stops & ~strong[1], dr.square(seen.stop), 0)
+    begins, stops = begins & strong[0], stops & strong[1]
+    dr.eval(begins, stops)
+    return _Far(begins, stops, left2, follows)
 
 
 def _changes(blocks: Blocks, pairs: Pairs, seen: Seen, n: int) -> Any:

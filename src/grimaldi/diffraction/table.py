@@ -178,21 +178,21 @@ class Packed(NamedTuple):
             exact = Exact(table, table.device(k))
         index = dr.uint32_array_t(types.Float)
         return Table(
-            self.centre,
-            self.reach,
-            self.from_source,
-            on_device(index, len(self.segments)),
-            on_device(index, len(self.plan.order)),
-            types.buffer(self.segments),
-            buffer(index, self.runs),
-            types.buffer(self.pieces),
-            buffer(index, np.repeat(np.arange(len(self.ranges) - 1), np.diff(self.ranges))),
-            buffer(dr.mask_t(types.Float), self.follows),
-            self.plan.tree(self.item, types),
-            on_device(types.Float, min(self.far, 1e30)),
-            on_device(types.Float, angle),
-            types,
-            exact,
+            centre=self.centre,
+            reach=self.reach,
+            from_source=self.from_source,
+            size=on_device(index, len(self.segments)),
+            n_pieces=on_device(index, len(self.plan.order)),
+            segments=types.buffer(self.segments),
+            ranges=buffer(index, self.runs),
+            pieces=types.buffer(self.pieces),
+            piece_of=buffer(index, np.repeat(np.arange(len(self.ranges) - 1), np.diff(self.ranges))),
+            follows=buffer(dr.mask_t(types.Float), self.follows),
+            tree=self.plan.tree(self.item, types),
+            far=on_device(types.Float, min(self.far, 1e30)),
+            angle=on_device(types.Float, angle),
+            types=types,
+            exact=exact,
         )
 
 

@@ -209,18 +209,18 @@ def _blocks(group: _Group, beside: list[Integers]) -> Blocks:
     single = np.float32
     right, down = _pixel(group)
     return Blocks(
-        mi.Point3d(group.p.T),
-        mi.Vector3f(group.n.T.astype(single)),
-        buffer(mi.Float, group.radius),
-        buffer(mi.Float, group.bend),
-        buffer(mi.Bool, group.there),
-        mi.Point3d(group.lattice.reshape(-1, 3).T),
-        mi.Vector3f(group.normals.reshape(-1, 3).T.astype(single)),
-        mi.Vector3f(right.T.astype(single)),
-        mi.Vector3f(down.T.astype(single)),
-        _bits(group.member | (group.bend == 0)[:, None]),
-        _boxes(group),
-        tuple(buffer(mi.UInt32, b) for b in beside),
+        p=mi.Point3d(group.p.T),
+        n=mi.Vector3f(group.n.T.astype(single)),
+        radius=buffer(mi.Float, group.radius),
+        bend=buffer(mi.Float, group.bend),
+        active=buffer(mi.Bool, group.there),
+        lattice=mi.Point3d(group.lattice.reshape(-1, 3).T),
+        normals=mi.Vector3f(group.normals.reshape(-1, 3).T.astype(single)),
+        right=mi.Vector3f(right.T.astype(single)),
+        down=mi.Vector3f(down.T.astype(single)),
+        members=_bits(group.member | (group.bend == 0)[:, None]),
+        boxes=_boxes(group),
+        beside=tuple(buffer(mi.UInt32, b) for b in beside),
     )
 
 
