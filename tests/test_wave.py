@@ -226,14 +226,20 @@ def test_scene_that_changes_is_prepared_anew():
     ("wrong", "says"),
     [
         ({"wavelength": -1.0}, "wavelength"),
+        ({"wavelength": [0.5, "0.5"]}, "given twice"),
+        ({"interference": "no"}, "interference"),
+        ({"precision": np.array([1, 2])}, "precision"),
         ({"diffraction": "boundry"}, "boundry"),
         ({"tolerance": 0.0}, "tolerance"),
         ({"occlusion": "some"}, "occlusion"),
         ({"rim": "round"}, "rim"),
         ({"spp": 0}, "spp"),
         ({"size": (0, 4)}, "size"),
+        ({"size": 5}, "size"),
+        ({"size": (10.5, 4)}, "size"),
         ({"seed": -1}, "seed"),
         ({"max_depth": -3}, "max_depth"),
+        ({"max_depth": 1 << 31}, "max_depth"),
         ({"tolerence": 1e-3}, "tolerance"),
     ],
 )
@@ -250,6 +256,51 @@ def test_the_integrator_takes_what_render_takes(given, means):
     assert (options.occlusion, options.rim) == (means, "smooth")
     with pytest.raises(RuntimeError, match="rim: 'round' is unknown"):
         mi.load_dict({"type": "wave", "wavelength": 1.0, "rim": "round"})
+
+
+def test_numbers_of_numpy_are_numbers():
+    of_numpy: Any = {"wavelength": np.array(10.0), "spp": np.int64(2), "seed": np.uint8(3), "size": np.array([24, 2])}
+    plain = grimaldi.render(young(), wavelength=10.0, spp=2, seed=3, size=(24, 2))
+    np.testing.assert_array_equal(grimaldi.render(young(), **of_numpy).U.values, plain.U.values)
+
+
+SKY_AND_LAMPS = {
+    "lamp": {"type": "point", "position": [2, 3, 4]},
+    "sky": {"type": "constant", "radiance": {"type": "rgb", "value": [0.3, 0.4, 0.5]}},
+    "pane": {"type": "rectangle", "to_world": T().translate([0, 0, 5]), "emitter": {"type": "area"}},
+    "globe": {"type": "sphere", "center": [-3, 0, 3], "radius": 0.3, "emitter": {"type": "area"}},
+}
+
+
+@pytest.mark.filterwarnings("ignore::grimaldi.errors.GrimaldiWarning")
+def test_any_number_of_lights_may_be_ordinary():
+    """The mean of the picture is Mitsuba's."""
+    scene = mi.load_dict(room({"type": "path", "max_depth": 3}, **SKY_AND_LAMPS))
+    expected = np.array(mi.render(scene, spp=256)).mean()
+    ours = grimaldi.render(scene, wavelength=0.01, diffraction="none", max_depth=3, spp=256).picture.values.mean()
+    assert ours == pytest.approx(expected, rel=0.01)
+
+
+@pytest.mark.parametrize(
+    "sensor",
+    [
+        {"type": "radiancemeter", "origin": [0.3, 0.2, 30], "direction": [0, 0, -1]},
+        {"type": "distant", "direction": [0, 0, -1], "target": [0, 0, 0]},
+    ],
+)
+def test_a_sensor_may_have_a_single_ray(sensor):
+    film = {"type": "hdrfilm", "width": 1, "height": 1, "rfilter": {"type": "box"}}
+    dictionary = young() | {"sensor": sensor | {"film": film}}
+    wave = grimaldi.render(dictionary, spp=4)
+    flat = grimaldi.render(dictionary, spp=4, diffraction="none", interference=False)
+    assert 0 < float(wave.picture.mean()) < 2.01 * float(flat.picture.mean())
+
+
+def test_a_loaded_scene_is_of_its_variant():
+    loaded = grimaldi.load(young())
+    mi.set_variant("llvm_ad_mono")
+    with pytest.raises(InputError, match="load it anew"):
+        grimaldi.render(loaded)
 
 
 def test_without_a_wavelength_one_is_suggested():

@@ -379,6 +379,23 @@ def test_variants_without_waves_are_refused(variant):
         grimaldi.render("young", spp=1, size=(8, 8))
 
 
+@pytest.mark.parametrize(
+    ("points", "says"),
+    [
+        ([[1j, 0, 0]], "points: not real numbers"),
+        ([[True, False, True]], "points: not real numbers"),
+        (np.array([["1", "2", "3"]]), "points: not real numbers"),
+        ([[10**400, 0, 0]], "points: not real numbers"),
+        (np.ma.masked_array(np.eye(1, 3), np.eye(1, 3, dtype=bool)), "points: not real numbers, or not all"),
+        ([[0, 0, 1], [1e300, 0, 0]], "points: row 1 is further than 1e\\+18 away"),
+        ([[np.nan, 0, 0]], "points: row 0 is not finite"),
+    ],
+)
+def test_points_are_real_numbers_within_reach(points: Any, says: str):
+    with pytest.raises(InputError, match=says):
+        grimaldi.field("young", points, wavelength=0.5)
+
+
 def test_plugins_that_messages_suggest_are_those_that_are_registered():
     """Of which they know the names alone."""
     names: list[str] = []

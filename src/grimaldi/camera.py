@@ -15,11 +15,22 @@ GRID = 32  # rays across the film
 
 
 class View(NamedTuple):
-    """Points (n, 3) that a camera sees, the unit normals there towards it (n, 3), and how wide a pixel is (n,)."""
+    """Points (n, 3) that a camera sees, the unit normals there towards it (n, 3), and how wide a pixel is (n,).
+
+    Where all rays of a film are one, pixels have no width.
+    """
 
     points: NDArray[np.float64]
     normals: NDArray[np.float64]
     pixel: NDArray[np.float64]
+
+
+def rays(sensor: Any, time: Any, wavelength: Any, place: Any, aperture: Any) -> tuple[Any, Any]:
+    """A sensor's rays and their weights, one for each place on the film [0..1]², even where all are the same."""
+    ray, weight = sensor.sample_ray_differential(time, wavelength, place, aperture)
+    none = dr.zeros(mi.Vector3f, dr.width(place))
+    ray.o, ray.d = ray.o + none, ray.d + none
+    return ray, weight
 
 
 def seen(scene: Scene, sensor: Any) -> View:
@@ -29,12 +40,12 @@ def seen(scene: Scene, sensor: Any) -> View:
     place, beside = index % GRID**2, index // GRID**2
     x = (mi.Float(place % GRID) + 0.5) / GRID + mi.Float(beside) / width
     y = (mi.Float(place // GRID) + 0.5) / GRID
-    ray, _ = sensor.sample_ray_differential(0.0, 0.5, mi.Point2f(x, y), mi.Point2f(0.5))
+    ray, _ = rays(sensor, 0.0, 0.5, mi.Point2f(x, y), mi.Point2f(0.5))
     si = scene.mitsuba.ray_intersect(ray)
     n = dr.mulsign(mi.Vector3f(si.n), -dr.dot(si.n, ray.d))
     met = si.is_valid()
     dr.eval(si.p, n, met)
     points, normals = (np.array(v, np.float64).T.reshape(2, -1, 3) for v in (si.p, n))
     pixel = np.linalg.norm(points[0] - points[1], axis=1)
-    keep = np.array(met).reshape(2, -1).all(axis=0) & (pixel > 0)
+    keep = np.array(met).reshape(2, -1).all(axis=0)
     return View(points[0][keep], normals[0][keep], pixel[keep])

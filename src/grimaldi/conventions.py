@@ -7,6 +7,7 @@ import re
 from collections.abc import Iterable, Sequence
 from difflib import get_close_matches
 from functools import cache
+from operator import index
 from typing import TYPE_CHECKING, Any, Literal
 
 from grimaldi.errors import InputError
@@ -48,21 +49,42 @@ def parse_wavelengths(wavelength: Wavelength | None, scene_unit: str | None = No
 
     Raises:
         InputError: naming `wavelength` or `scene_unit`: no positive finite number, one outside 1e-18 to 1e18
-            scene units, an unknown unit, a unit that is no length, a unit without `scene_unit`, or none at all.
+            scene units, an unknown unit, a unit that is no length, a unit without `scene_unit`, one that is given
+            twice, or none at all.
     """
     if wavelength is None:
         raise InputError("wavelength: there is none; give one, such as wavelength=0.5 in scene units or '532 nm'")
     scale = None if scene_unit is None else _scene_unit(scene_unit)
     if isinstance(wavelength, str):
         items: Iterable[Any] = wavelength.split(",")
-    elif isinstance(wavelength, Iterable):
+    elif isinstance(wavelength, Iterable) and getattr(wavelength, "ndim", 1) and not isinstance(wavelength, bytes):
         items = wavelength
     else:
         items = (wavelength,)
     result = tuple(_one(item, scale) for item in items)
     if not result:
         raise InputError("wavelength: the list is empty; give at least one, such as 0.5")
+    for i, value in enumerate(result):
+        if value in result[:i]:
+            raise InputError(f"wavelength: {value:g} is given twice; give each once")
     return result
+
+
+def whole(value: Any) -> int | None:
+    """A whole number, of NumPy's too; None where it is none."""
+    if isinstance(value, bool):
+        return None
+    try:
+        return index(value)
+    except TypeError:
+        return None
+
+
+def checked_flag(name: str, value: Any) -> bool:
+    """True or False; InputError for what is neither."""
+    if not isinstance(value, bool) and (str(getattr(value, "dtype", "")) != "bool" or value.ndim):
+        raise InputError(f"{name}: {value!r} is neither True nor False; give one of these")
+    return bool(value)
 
 
 def check_options(given: Iterable[str], allowed: Iterable[str]) -> None:

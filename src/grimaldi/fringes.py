@@ -45,7 +45,8 @@ def _scales(scene: Scene, sensor: Any) -> Iterator[tuple[float, float]]:
     Behind an edge the first fringe takes √(λ z2 (z1+z2)/z1), z1 and z2 the distances from the edge to the source and
     to the surface; two sources of one group make fringes λ/α apart, α the angle between them.
     """
-    view = seen(scene, sensor)
+    whole = seen(scene, sensor)
+    view = View(*(values[whole.pixel > 0] for values in whole))
     points, pixel = view.points, view.pixel
     if not len(points):
         return

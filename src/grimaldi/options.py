@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any, get_args
 
-from grimaldi.conventions import SIGNS, Wavelength, did_you_mean
+from grimaldi.conventions import SIGNS, Wavelength, checked_flag, did_you_mean, whole
 from grimaldi.errors import InputError
 
 if TYPE_CHECKING:
@@ -40,6 +40,7 @@ class Settings:
         from grimaldi.diffraction import model
 
         model(self.diffraction)
+        checked_flag("interference", self.interference)
         self.options()
 
     def options(self) -> Options:
@@ -68,21 +69,24 @@ def checked_options(
         raise InputError(f"tolerance: {tolerance!r} is no number; give one such as 1e-3") from None
     if not 1e-12 <= tolerance < 1 or not math.isfinite(tolerance):
         raise InputError(f"tolerance: {tolerance:g} is out of reach; give a number from 1e-12 to 1")
-    if precision not in get_args(Precision):
-        raise InputError(f"precision: {precision!r} is unknown; {did_you_mean(precision, get_args(Precision))}")
     if isinstance(occlusion, bool):
         occlusion = "graded" if occlusion else "none"
-    if occlusion not in get_args(Occlusion):
-        raise InputError(f"occlusion: {occlusion!r} is unknown; {did_you_mean(occlusion, get_args(Occlusion))}")
-    if rim not in get_args(Rim):
-        raise InputError(f"rim: {rim!r} is unknown; {did_you_mean(rim, get_args(Rim))}")
-    if weights not in get_args(Weights):
-        raise InputError(f"weights: {weights!r} is unknown; {did_you_mean(weights, get_args(Weights))}")
-    if n is not None and n != NYQUIST and (not isinstance(n, int) or isinstance(n, bool) or not 1 <= n <= MOST):
-        raise InputError(f"n: {n!r} is no number of sources; give an integer from 1 to {MOST}, or {NYQUIST!r}")
-    if not isinstance(fast, bool):
-        raise InputError(f"fast: {fast!r} is neither True nor False; give one of these")
-    return Options(tolerance, precision, occlusion, rim, n, weights, _positive("epsilon", epsilon), fast)
+    kinds = {
+        "precision": (precision, Precision),
+        "occlusion": (occlusion, Occlusion),
+        "rim": (rim, Rim),
+        "weights": (weights, Weights),
+    }
+    for name, (value, known) in kinds.items():
+        if not isinstance(value, str) or value not in get_args(known):
+            raise InputError(f"{name}: {value!r} is unknown; {did_you_mean(value, get_args(known))}")
+    if n is not None and not (isinstance(n, str) and n == NYQUIST):
+        count = whole(n)
+        if count is None or not 1 <= count <= MOST:
+            raise InputError(f"n: {n!r} is no number of sources; give an integer from 1 to {MOST}, or {NYQUIST!r}")
+        n = count
+    epsilon, fast = _positive("epsilon", epsilon), checked_flag("fast", fast)
+    return Options(tolerance, precision, occlusion, rim, n, weights, epsilon, fast)
 
 
 def _positive(name: str, value: Any) -> float | None:

@@ -15,6 +15,7 @@ from grimaldi.options import checked_options, describe
 if TYPE_CHECKING:
     import xarray as xr
 
+FURTHEST = 1e18  # scene units: squares of coordinates beyond overflow
 Summed = dict[tuple[int, ...], NDArray[Any]]  # numbers of all points, by wavelength or by that and group
 
 
@@ -81,7 +82,7 @@ def field(
 
     from grimaldi.accuracy import Misses, warn_of_faint_light
     from grimaldi.coherence import groups, intensity, separated
-    from grimaldi.conventions import check_options, parse_wavelengths
+    from grimaldi.conventions import check_options, checked_flag, parse_wavelengths
     from grimaldi.diffraction import model
     from grimaldi.engine.progress import progress
     from grimaldi.propagate import propagate_all
@@ -104,7 +105,7 @@ def field(
     loaded = load(scene, scene_unit=scene_unit, smooth=smooth)
     wavelengths = parse_wavelengths(loaded.wavelength if wavelength is None else wavelength, loaded.unit)
     require_sources(loaded)
-    sources = loaded.sources if interference else separated(loaded.sources)
+    sources = loaded.sources if checked_flag("interference", interference) else separated(loaded.sources)
 
     names = groups(sources)
     fields: Summed = {}
@@ -153,14 +154,11 @@ def _stacked(sums: Summed, shape: tuple[int, ...], n: int, kind: type) -> NDArra
 
 
 def checked_points(points: ArrayLike) -> NDArray[np.float64]:
-    """A copy of points as (n, 3) float64, column by column; InputError where they are not that, or not finite."""
+    """A copy of points as (n, 3) float64, column by column; InputError where they are not that, or out of reach."""
     from grimaldi.diffraction.arrays import aligned_empty
     from grimaldi.parts import parts
 
-    try:
-        p = np.asarray(points, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise InputError("points: not numbers; give an array of shape (n, 3)") from None
+    p = real(points, "points")
     if p.shape == (3,):
         p = p[None]
     if p.ndim != 2 or p.shape[1] != 3:
@@ -168,7 +166,19 @@ def checked_points(points: ArrayLike) -> NDArray[np.float64]:
     columns = aligned_empty(p.size, np.float64).reshape(3, -1)
     for some in parts(len(p)):
         columns[:, some] = p[some].T
-        if not np.isfinite(columns[:, some]).all():
-            row = int(np.flatnonzero(~np.isfinite(p).all(axis=1))[0])
-            raise InputError(f"points: row {row} is not finite; give numbers")
+        if not (np.abs(columns[:, some]) <= FURTHEST).all():
+            row = int(np.flatnonzero(~(np.abs(p) <= FURTHEST).all(axis=1))[0])
+            what = f"further than {FURTHEST:g} away" if np.isfinite(p[row]).all() else "not finite"
+            raise InputError(f"points: row {row} is {what}; give points of the scene")
     return columns.T
+
+
+def real(values: Any, name: str) -> NDArray[np.float64]:
+    """Real numbers in Float64; InputError for what is something else: complex numbers, times, flags, text, gaps."""
+    try:
+        array = np.asarray(values)
+        if array.dtype.kind in "iufO" and not np.ma.is_masked(values):
+            return np.asarray(array, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError):
+        pass
+    raise InputError(f"{name}: not real numbers, or not all; give an array of shape (n, 3)") from None

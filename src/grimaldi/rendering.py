@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
 from inspect import signature
@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from grimaldi.conventions import check_options
+from grimaldi.conventions import check_options, whole
 from grimaldi.errors import GrimaldiWarning, InputError
 from grimaldi.film.layers import Layers
 from grimaldi.one_at_a_time import one_at_a_time
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from grimaldi.scene.model import Scene
 
 SAMPLES = 1 << 20  # a pixel, at most
+DEEPEST = (1 << 31) - 1  # segments of a path
 
 
 @one_at_a_time
@@ -170,7 +171,8 @@ def resized(sensor: Any, size: tuple[int, int] | None) -> Iterator[None]:
     if size is None:
         yield
         return
-    if len(size) != 2 or min(size) < 1 or int(size[0]) * int(size[1]) > 2**28:
+    sides = tuple(whole(side) or 0 for side in size) if isinstance(size, Iterable) else ()
+    if len(sides) != 2 or min(sides) < 1 or sides[0] * sides[1] > 2**28:
         raise InputError(f"size: {size!r} is no film size; give (width, height) in pixels, at most 2^28 in all")
     params: Any = mi.traverse(sensor)
     names = ("film.size", "film.crop_size", "film.crop_offset")
@@ -181,7 +183,7 @@ def resized(sensor: Any, size: tuple[int, int] | None) -> Iterator[None]:
             params[name] = mi.ScalarPoint2u(*(int(v) for v in value))
         params.update()
 
-    change(size, size, (0, 0))
+    change(sides, sides, (0, 0))
     try:
         yield
     finally:
@@ -194,15 +196,20 @@ def shot_of(sensor: Any, own: Any, spp: int | None, seed: int, max_depth: int | 
 
     width, height = (int(v) for v in sensor.film().crop_size())
     count = sensor.sampler().sample_count() if spp is None else spp
-    if not isinstance(count, int) or isinstance(count, bool) or not 1 <= count <= SAMPLES:
-        raise InputError(f"spp: {count!r} is no number of samples; give 1 to {SAMPLES}, such as 16")
-    if not isinstance(seed, int) or isinstance(seed, bool) or not 0 <= seed < 1 << 32:
-        raise InputError(f"seed: {seed!r} is no seed; give an integer from 0 to 2^32 - 1")
     depth = max_depth if max_depth is not None else (own.max_depth if own is not None else 2)
-    if not isinstance(depth, int) or depth < -1:
-        raise InputError(f"max_depth: {depth!r} is no path length; give 2 for direct light, -1 for no limit")
+    samples = _whole("spp", count, 1, SAMPLES, f"number of samples; give 1 to {SAMPLES}, such as 16")
+    seed = _whole("seed", seed, 0, (1 << 32) - 1, "seed; give an integer from 0 to 2^32 - 1")
+    depth = _whole("max_depth", depth, -1, DEEPEST, "path length; give 2 for direct light, -1 for no limit")
     rr_depth, hidden = (own.rr_depth, own.hidden) if own is not None else (5, False)
-    return Shot(width, height, count, seed, depth, rr_depth, hidden)
+    return Shot(width, height, samples, seed, depth, rr_depth, hidden)
+
+
+def _whole(name: str, value: Any, least: int, most: int, what: str) -> int:
+    """A whole number within limits; InputError saying `what` it is not."""
+    number = whole(value)
+    if number is None or not least <= number <= most:
+        raise InputError(f"{name}: {value!r} is no {what}")
+    return number
 
 
 def _side_by_side(scene: Scene, light: Light, settings: Settings, shot: Shot, done: list[Tile]) -> Layers:

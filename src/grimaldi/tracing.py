@@ -147,12 +147,12 @@ def ordinary_emitters(scene: Any) -> list[int]:
 
 def ordinary_light(scene: Any, sampler: Any, ordinary: list[int], si: Any, bsdf: Any, active: Any) -> Any:
     """One ordinary emitter's light at a vertex, chosen uniformly, by sampling it."""
-    table = dr.gather(mi.EmitterPtr, scene.emitters_dr(), mi.UInt32(ordinary))
     u = sampler.next_2d(active)
     scaled = u.x * len(ordinary)
     choice = dr.minimum(mi.UInt32(scaled), len(ordinary) - 1)
     u.x = scaled - choice
-    emitter = dr.gather(mi.EmitterPtr, table, choice, active)
+    index = dr.gather(mi.UInt32, mi.UInt32(ordinary), choice, active)
+    emitter = dr.gather(mi.EmitterPtr, scene.emitters_dr(), index, active)
     ds, weight = emitter.sample_direction(si, u, active)
     ds.pdf /= len(ordinary)
     active &= ds.pdf != 0

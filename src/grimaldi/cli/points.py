@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from grimaldi.errors import InputError
+from grimaldi.pipeline import real
 
 Points = NDArray[np.float64]
 
@@ -23,10 +24,10 @@ def read_points(path: Path) -> Points:
             case ".npy":
                 values = np.load(path, allow_pickle=False)
             case ".csv":
-                values = _table(path.read_text())
+                values = _table(path.read_text(encoding="utf-8-sig"))
             case suffix:
                 raise InputError(f"{path}: unknown kind of file {suffix!r}; give points as .npy or .csv")
-        points = np.asarray(values, dtype=np.float64)
+        points = real(values, str(path))
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror or error}); check the name") from None
     except (ValueError, TypeError, EOFError) as error:

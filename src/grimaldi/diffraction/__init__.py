@@ -16,7 +16,7 @@ def model(name: str) -> Model:
     Raises InputError for any other name, with the nearest of these.
     """
     names = sorted(get_args(ModelName))
-    if name not in names:
+    if not isinstance(name, str) or name not in names:
         raise InputError(f"diffraction: {name!r} is no model; {did_you_mean(name, names)}")
     found: Model = getattr(import_module(f"{__name__}.{name}"), name)
     return found

@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import drjit as dr
 import mitsuba
 
+from grimaldi.camera import rays
 from grimaldi.diffraction.model import OUTSIDE, Factor, Receivers
 from grimaldi.engine.asking import Ask, ask, pieces, work
 from grimaldi.engine.blocks import Sight, squares
@@ -101,7 +102,7 @@ def tiles(light: Light, shot: Shot, band: Band) -> Iterator[tuple[int, int]]:
 def sight(light: Light, sensor: Any, shot: Shot, x: Any, y: Any) -> tuple[Sight, Any]:
     """What the camera sees at places of the film [pixels], and Mitsuba's interactions."""
     place = mi.Point2f(x, y) / mi.Point2f(dr.opaque(mi.Float, shot.width), dr.opaque(mi.Float, shot.height))
-    ray, _ = sensor.sample_ray_differential(sensor.shutter_open(), 0.5, place, mi.Point2f(0.5))
+    ray, _ = rays(sensor, sensor.shutter_open(), 0.5, place, mi.Point2f(0.5))
     si = light.scene.mitsuba.ray_intersect(ray, mi.RayFlags.All, True, True)  # neighbours go the same way
     lit = si.is_valid() & mi.has_flag(si.bsdf(ray).flags(), mi.BSDFFlags.Smooth)
     n = mi.Vector3f(dr.mulsign(si.n, -dr.dot(si.n, ray.d)))
@@ -226,7 +227,7 @@ def _traced(
     if sensor.shutter_open_time() > 0:
         time += stream.next_1d() * sensor.shutter_open_time()
     aperture = stream.next_2d()
-    ray, weight = sensor.sample_ray_differential(time, stream.next_1d(), place, aperture)
+    ray, weight = rays(sensor, time, stream.next_1d(), place, aperture)
 
     def reflected(ray: Any, si: Any, bsdf: Any, n: Any, active: Any, first: Any) -> Reflected:
         known = []

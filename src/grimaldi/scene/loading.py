@@ -47,7 +47,8 @@ def load(
         smooth: levels, 0 to 6, by which meshes with vertex normals are divided into the curved surfaces that these
             stand for, each face into 4^smooth: for the camera, for rays, and for outlines.
 
-    Where no Mitsuba variant is set, the best mono one that works is.
+    Where no Mitsuba variant is set, the best mono one that works is. What is returned is of that variant, and does not
+    follow what changes in the Mitsuba scene later: load that anew.
 
     Raises:
         InputError: one line that names file and place, what is wrong there and the remedy.
@@ -59,6 +60,7 @@ def load(
     check_levels(smooth)
     added = _outlines(outlines)
     if isinstance(scene, Scene):
+        _check_variant(scene)
         loaded = replace(scene, sources=sources(scene.mitsuba, coherent=coherent)) if coherent else scene
         if not added and scene_unit is None and smooth == 0:
             return loaded
@@ -136,6 +138,16 @@ def _of_wave(integrator: Any, name: str) -> Any:
     """A setting of a scene's own `wave` integrator; None of any other."""
     light_of = getattr(integrator, "light_of", None)
     return None if light_of is None else getattr(light_of.settings, name)
+
+
+def _check_variant(scene: Scene) -> None:
+    """InputError where a scene was loaded in another variant than that in use."""
+    import mitsuba as mi
+
+    if not isinstance(scene.mitsuba, mi.Scene):
+        raise InputError(
+            f"{scene.name}: was not loaded in variant {mi.variant()}; load it anew, or set its own variant"
+        )
 
 
 def _open(scene: Any) -> tuple[str, Any, str | None]:
