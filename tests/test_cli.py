@@ -96,6 +96,7 @@ def said(done: subprocess.CompletedProcess[str]) -> str:
         (["field", "young", "-o", "x.npz", "--points", "empty.csv"], "empty.csv: has the shape (0, 3)"),
         (["field", "young", "-o", "x.npz", "--points", "nan.csv"], "nan.csv: row 2 is not finite"),
         (["field", "young", "-o", "x.npz", "--points", "words.npy"], "words.npy: not a table of numbers"),
+        (["field", "young", "-o", "x.npz", "--points", "complex.npy"], "complex.npy: not real numbers"),
         (["field", "young", "-o", "x.npz", "--plane", "0,0,0; 1,0,0; 0,1,0"], "--plane: cannot read"),
         (["field", "young", "-o", "x.npz", "--plane", "0,0; 1,0; 0,1; 2x2"], "--plane: cannot read"),
         (["field", "young", "-o", "x.npz", "--plane", "0,0,0; 1,0,0; 0,nan,0; 2x2"], "--plane: cannot read"),
@@ -116,6 +117,7 @@ def test_wrong_usage_is_one_line_and_writes_nothing(tmp_path: Path, arguments: l
     (tmp_path / "empty.csv").write_text("x, y, z\n")
     (tmp_path / "nan.csv").write_text("1,2,3\n4,nan,6\n")
     (tmp_path / "words.npy").write_text("not an array")
+    np.save(tmp_path / "complex.npy", [[1j, 0, 0]])
     before = sorted(tmp_path.iterdir())
     assert named in said(command(*arguments, cwd=tmp_path))
     assert sorted(tmp_path.iterdir()) == before
@@ -162,7 +164,7 @@ def test_field_files_hold_what_the_library_returns(tmp_path: Path, scene: Path) 
     x, y = np.meshgrid(np.linspace(-3, 3, 4), np.linspace(-3, 3, 3))
     points = np.stack([x, y, np.full_like(x, 9.0)], axis=-1).reshape(-1, 3)
     np.save(tmp_path / "points.npy", points)
-    np.savetxt(tmp_path / "points.csv", points, delimiter=",", header="x, y, z")
+    np.savetxt(tmp_path / "points.csv", points, delimiter=",", header="x, y, z", comments="\ufeff", encoding="utf-8")
     expected = grimaldi.field(str(scene), points, wavelength="500 nm", scene_unit="1 um")
 
     unit = ["--wavelength", "500 nm", "--scene-unit", "1 um"]

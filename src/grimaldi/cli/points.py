@@ -27,11 +27,11 @@ def read_points(path: Path) -> Points:
                 values = _table(path.read_text(encoding="utf-8-sig"))
             case suffix:
                 raise InputError(f"{path}: unknown kind of file {suffix!r}; give points as .npy or .csv")
-        points = real(values, str(path))
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror or error}); check the name") from None
     except (ValueError, TypeError, EOFError) as error:
         raise InputError(f"{path}: not a table of numbers ({error}); give x, y, z in rows") from None
+    points = real(values, str(path))
     if points.ndim != 2 or points.shape[1] != 3 or len(points) == 0:
         raise InputError(f"{path}: has the shape {points.shape}; give n rows of x, y, z")
     bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
