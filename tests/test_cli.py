@@ -15,6 +15,7 @@ import pytest
 import xarray as xr
 
 import grimaldi
+from grimaldi.files import replacing
 
 SCENE = """
 <scene version="3.0.0">
@@ -158,6 +159,18 @@ def test_without_libllvm_the_remedy_is_named(tmp_path: Path, scene: Path) -> Non
         assert done.returncode in (1, 2)
         assert "unset DRJIT_LIBLLVM_PATH" in done.stdout + done.stderr.splitlines()[-1]
         assert "Traceback" not in done.stderr
+
+
+def test_a_link_stays_and_a_name_may_be_long(tmp_path: Path) -> None:
+    (tmp_path / "there").mkdir()
+    link, long = tmp_path / "link.npz", tmp_path / f"{245 * 'x'}.npz"
+    link.symlink_to(tmp_path / "there" / "real.npz")
+    for path in (link, long):
+        with replacing(path) as temporary:
+            temporary.write_text("done")
+        assert path.read_text() == "done"
+    assert link.is_symlink()
+    assert len(list(tmp_path.rglob("*"))) == 4
 
 
 def test_field_files_hold_what_the_library_returns(tmp_path: Path, scene: Path) -> None:

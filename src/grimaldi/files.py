@@ -10,18 +10,21 @@ from pathlib import Path
 
 from grimaldi.errors import InputError
 
+SCRATCH = ".grimaldi-"  # names of what is not done yet begin so
+
 
 @contextmanager
 def replacing(path: str | Path) -> Iterator[Path]:
-    """A temporary name beside `path`, with its suffix, that becomes `path` when the block ends well.
+    """A temporary name beside `path`, with its suffix, that becomes `path`, or what that links to, when all went well.
 
     The temporary file is removed when the block raises. Raises InputError where the folder of `path`
     is missing or cannot be written to.
     """
     path = Path(path)
+    path = path.resolve() if path.is_symlink() else path
     check_writable(path)
     try:
-        handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.stem}-", suffix=path.suffix)
+        handle, name = tempfile.mkstemp(dir=path.parent, prefix=SCRATCH, suffix=path.suffix)
     except OSError as error:
         raise InputError(f"{path}: cannot write there ({error.strerror}); choose another folder") from error
     os.close(handle)
@@ -39,7 +42,7 @@ def replacing_folder(path: str | Path) -> Iterator[Path]:
     """Like `replacing`, for output that is a folder: a new one that takes the place of an older one."""
     path = Path(path)
     check_writable(path, folder=True)
-    with tempfile.TemporaryDirectory(dir=path.parent, prefix=f".{path.stem}-") as scratch:
+    with tempfile.TemporaryDirectory(dir=path.parent, prefix=SCRATCH) as scratch:
         new, old = Path(scratch, "new"), Path(scratch, "old")
         new.mkdir()
         yield new
