@@ -173,6 +173,19 @@ def test_instances_are_what_they_repeat():
     assert np.abs(ours.U / plain.U).values.min() > 0
 
 
+def test_any_number_of_instances():
+    """As many nodes more as move the others in memory, whatever room there was."""
+    for count in (1, 2, 3, 5, 9, 40):
+        places = {f"at{i}": T().translate([4.0 * i, 0, 0]) for i in range(count)}
+        scene = {"type": "scene", "light": {"type": "coherent_point", "position": [3, -2, -40]}}
+        scene |= {
+            name: {"type": "instance", "to_world": at, "group": {"type": "ref", "id": "tree"}}
+            for name, at in places.items()
+        }
+        names = [body.name for body in grimaldi.load(scene | {"tree": TREE}).bodies]
+        assert sorted(names) == sorted(f"{name}.{part}" for name in places for part in ("trunk", "crown"))
+
+
 def test_instances_from_xml(tmp_path):
     (tmp_path / "x.xml").write_text(
         '<scene version="3.0.0"><emitter type="point"/>'

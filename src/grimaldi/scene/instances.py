@@ -16,27 +16,37 @@ def write_out(state: Any) -> None:
     import mitsuba as mi
 
     root = state.root.props
+    copies = {}
     for name in list(root):
         index = _reference(root, name)
-        if index is None or state.nodes[index].props.plugin_name() != "instance":
+        if index is not None and state.nodes[index].props.plugin_name() == "instance":
+            copies[name] = _copies(state, state.nodes[index], name)
+    # as the nodes become more they move: what was read of them is gone then
+    for name, shapes in copies.items():
+        for child, shape in shapes:
+            state.nodes.append(shape)
+            state.root.props[f"{name}.{child}"] = mi.Properties.ResolvedReference(len(state.nodes) - 1)
+        del state.root.props[name]
+
+
+def _copies(state: Any, instance: Any, name: str) -> list[tuple[str, Any]]:
+    """The shapes of an instance's group in its place, and what the group calls them."""
+    import mitsuba as mi
+
+    group, found = _group(state, instance), []
+    for child in list(group):
+        shape = _reference(group, child)
+        if shape is None:
             continue
-        instance = state.nodes[index]
-        group = _group(state, instance)
-        for child in list(group):
-            shape = _reference(group, child)
-            if shape is None:
-                continue
-            copy = mi.parser.SceneNode()
-            original = state.nodes[shape]
-            copy.type, copy.file_index, copy.offset = original.type, original.file_index, original.offset
-            copy.props = mi.Properties(original.props)
-            copy.props.set_id(f"{instance.props.id() or name}.{original.props.id() or child}")
-            transforms = [p["to_world"] for p in (instance.props, original.props) if "to_world" in p]
-            if transforms:
-                copy.props["to_world"] = transforms[0] @ transforms[1] if len(transforms) > 1 else transforms[0]
-            state.nodes.append(copy)
-            root[f"{name}.{child}"] = mi.Properties.ResolvedReference(len(state.nodes) - 1)
-        del root[name]
+        copy, original = mi.parser.SceneNode(), state.nodes[shape]
+        copy.type, copy.file_index, copy.offset = original.type, original.file_index, original.offset
+        copy.props = mi.Properties(original.props)
+        copy.props.set_id(f"{instance.props.id() or name}.{original.props.id() or child}")
+        transforms: list[Any] = [p["to_world"] for p in (instance.props, original.props) if "to_world" in p]
+        if transforms:
+            copy.props["to_world"] = transforms[0] @ transforms[1] if len(transforms) > 1 else transforms[0]
+        found.append((child, copy))
+    return found
 
 
 def _group(state: Any, instance: Any) -> Any:
