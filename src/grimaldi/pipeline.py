@@ -11,11 +11,11 @@ from numpy.typing import ArrayLike, NDArray
 from grimaldi.errors import InputError
 from grimaldi.one_at_a_time import one_at_a_time
 from grimaldi.options import checked_options, describe
+from grimaldi.scene.triangles import LARGEST
 
 if TYPE_CHECKING:
     import xarray as xr
 
-FURTHEST = 1e18  # scene units: squares of coordinates beyond overflow
 Summed = dict[tuple[int, ...], NDArray[Any]]  # numbers of all points, by wavelength or by that and group
 
 
@@ -166,9 +166,9 @@ def checked_points(points: ArrayLike) -> NDArray[np.float64]:
     columns = aligned_empty(p.size, np.float64).reshape(3, -1)
     for some in parts(len(p)):
         columns[:, some] = p[some].T
-        if not (np.abs(columns[:, some]) <= FURTHEST).all():
-            row = int(np.flatnonzero(~(np.abs(p) <= FURTHEST).all(axis=1))[0])
-            what = f"further than {FURTHEST:g} away" if np.isfinite(p[row]).all() else "not finite"
+        if not (np.abs(columns[:, some]) <= LARGEST).all():
+            row = int(np.flatnonzero(~(np.abs(p) <= LARGEST).all(axis=1))[0])
+            what = f"further than {LARGEST:g} away" if np.isfinite(p[row]).all() else "not finite"
             raise InputError(f"points: row {row} is {what}; give points of the scene")
     return columns.T
 

@@ -168,11 +168,13 @@ def resized(sensor: Any, size: tuple[int, int] | None) -> Iterator[None]:
     """The sensor with a film of another size, put back afterwards."""
     import mitsuba as mi
 
+    from grimaldi.scene.checking import LARGEST_FILM
+
     if size is None:
         yield
         return
     sides = tuple(whole(side) or 0 for side in size) if isinstance(size, Iterable) else ()
-    if len(sides) != 2 or min(sides) < 1 or sides[0] * sides[1] > 2**28:
+    if len(sides) != 2 or min(sides) < 1 or sides[0] * sides[1] > LARGEST_FILM:
         raise InputError(f"size: {size!r} is no film size; give (width, height) in pixels, at most 2^28 in all")
     params: Any = mi.traverse(sensor)
     names = ("film.size", "film.crop_size", "film.crop_offset")

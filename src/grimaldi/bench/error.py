@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 import grimaldi
 from grimaldi.bench.timing import anew, timed
 from grimaldi.scene.model import Scene
+from grimaldi.validation.computing import rms
 
 TOLERANCES = (0.3, 0.2, 0.15, 0.1, 7e-2, 5e-2, 4e-2, 3e-2, 2e-2, 1e-2, 5e-3, 2e-3, 1e-3)  # the loosest first
 REFERENCE = 1e-4
@@ -54,7 +55,7 @@ class Reference:
     def error(self, picture: NDArray[np.float64]) -> float:
         """Of a picture (y, x, channel): rms(p - p') / rms(p' - p0), p' with diffraction and p0 without."""
         p = picture.reshape(-1, picture.shape[2])[self.pixels]
-        return rms(p - self.wave) / rms(self.wave - self.rays)
+        return rms(p, self.wave) / rms(self.wave, self.rays)
 
 
 @dataclass(frozen=True)
@@ -137,7 +138,3 @@ def field_error(scene: Scene, points: NDArray[np.float64], wavelength: float, to
     asked = grimaldi.field(scene, points, wavelength=wavelength, tolerance=tolerance)
     strict = grimaldi.field(scene, points, wavelength=wavelength, tolerance=1e-2 * tolerance, precision="double")
     return float(abs(asked.U - strict.U).max())
-
-
-def rms(values: NDArray[np.float64]) -> float:
-    return float(np.sqrt((values**2).mean()))

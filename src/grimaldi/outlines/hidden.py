@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from grimaldi.outlines.candidate import Candidates, toward
 from grimaldi.outlines.model import Integers, Reals
 from grimaldi.outlines.pieces import Pieces
-from grimaldi.outlines.soup import Soup, by_threads, grouped
+from grimaldi.outlines.soup import Soup, by_threads, dot, grouped
 from grimaldi.outlines.view import View
 from grimaldi.scene.bodies import vertices
 from grimaldi.scene.model import Body, Cylinder, Disk, Mesh, Source, Sphere
@@ -147,18 +147,14 @@ def meeting(corners: Reals, x: Reals, w: Reals) -> Reals:
     a, b, c = (corners - x.T[:, None]).swapaxes(0, 1)
     bc, ca, ab = _cross(b, c), _cross(c, a), _cross(a, b)
     d = np.ascontiguousarray(w.T)
-    u, v, s = _dot(d, bc), _dot(d, ca), _dot(d, ab)
+    u, v, s = dot(d, bc), dot(d, ca), dot(d, ab)
     inside = ((u >= 0) & (v >= 0) & (s >= 0)) | ((u <= 0) & (v <= 0) & (s <= 0))
     with np.errstate(divide="ignore", invalid="ignore"):
-        return np.where(inside, _dot(a, bc) / (u + v + s), np.nan)
+        return np.where(inside, dot(a, bc) / (u + v + s), np.nan)
 
 
 def _cross(p: Reals, q: Reals) -> Reals:
     return np.stack([p[1] * q[2] - p[2] * q[1], p[2] * q[0] - p[0] * q[2], p[0] * q[1] - p[1] * q[0]])
-
-
-def _dot(p: Reals, q: Reals) -> Reals:
-    return p[0] * q[0] + p[1] * q[1] + p[2] * q[2]
 
 
 def _on_sphere(sphere: Sphere, source: Source, x: Reals, own: NDArray[np.bool_]) -> tuple[Reals, Reals]:

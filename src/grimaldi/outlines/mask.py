@@ -13,6 +13,7 @@ from grimaldi.outlines.projection import Projection, projection
 from grimaldi.outlines.sphere import across, tangent_circle
 from grimaldi.scene.bodies import is_flat, plane, vertices
 from grimaldi.scene.model import Body, Cylinder, Disk, Mesh, Scene, Source
+from grimaldi.scene.triangles import solid_angle
 
 if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry
@@ -93,15 +94,10 @@ def _side(source: Source, centre: Reals, normal: Reals) -> float:
 
 
 def _surrounds(body: Body, source: Source) -> bool:
-    """Whether a mesh covers more than half of all directions: its solid angle (van Oosterom, Strackee 1983)."""
+    """Whether a mesh covers more than half of all directions."""
     if source.position is None or not isinstance(body.geometry, Mesh):
         return False
-    x = body.geometry.vertices[body.geometry.faces] - source.position
-    x = x / np.linalg.norm(x, axis=2, keepdims=True)
-    a, b, c = np.moveaxis(x, 1, 0)
-    volume = np.einsum("ij,ij->i", a, np.cross(b, c))
-    dots = (a * b).sum(1) + (b * c).sum(1) + (c * a).sum(1)
-    return bool(abs(2 * np.arctan2(volume, 1 + dots).sum()) > 2 * np.pi * (1 + 1e-6))
+    return abs(solid_angle(body.geometry.vertices, body.geometry.faces, source.position)) > 2 * np.pi * (1 + 1e-6)
 
 
 def _triangles(body: Body, source: Source) -> Reals:

@@ -7,14 +7,12 @@ matters. Each triangle's side is decided once: the edges of a closed mesh form c
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
 from grimaldi.outlines.candidate import EDGE_ON, Candidates, edge_on, facing
 from grimaldi.outlines.model import Integers, Reals
-from grimaldi.outlines.soup import Soup, by_threads
+from grimaldi.outlines.soup import Soup, by_threads, dot
 from grimaldi.scene.model import Source
 from grimaldi.scene.triangles import areas
 
@@ -34,14 +32,14 @@ def sides(soup: Soup, source: Source) -> NDArray[np.int8]:
         else:
             assert source.direction is not None
             w = [-d for d in source.direction]
-        along, area2, w2 = _dot(area, w), _dot(area, area), _dot(w, w)
+        along, area2, w2 = dot(area, w), dot(area, area), dot(w, w)
         side[part] = np.where(along > 0, -1, 1)
         level[part] = along * along <= EDGE_ON**2 * area2 * w2
     some = np.flatnonzero(level)
     if len(some):
         a, area = _areas(soup, some)
         middle = _middles(soup, soup.body[some])
-        side[some] = np.where(_dot(area, a - middle) < 0, -1, 1)
+        side[some] = np.where(dot(area, a - middle) < 0, -1, 1)
         standing = np.zeros(len(soup.first) - 1, bool)
         standing[soup.body[~level]] = True
         side[~standing[soup.body]] = 0
@@ -53,10 +51,6 @@ def _areas(soup: Soup, which: slice | Integers) -> tuple[Reals, Reals]:
     a, b, c = (soup.points.take(corners[which], axis=1) for corners in soup.corners)
     (ux, uy, uz), (vx, vy, vz) = b - a, c - a
     return a, np.stack([uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx])
-
-
-def _dot(p: Any, q: Any) -> Any:
-    return p[0] * q[0] + p[1] * q[1] + p[2] * q[2]
 
 
 def _middles(soup: Soup, body: Integers) -> Reals:

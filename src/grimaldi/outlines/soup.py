@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -125,3 +125,8 @@ def grouped(numbers: Integers) -> Iterator[tuple[int, Integers]]:
     first = np.flatnonzero(np.append(True, np.diff(numbers[order]) != 0)[: len(order)])
     for begin, end in zip(first, np.append(first[1:], len(order)), strict=False):
         yield int(numbers[order[begin]]), order[begin:end]
+
+
+def dot(p: Any, q: Any) -> Any:
+    """Of vectors (3, n) by rows, which NumPy sums quicker so."""
+    return p[0] * q[0] + p[1] * q[1] + p[2] * q[2]

@@ -21,7 +21,7 @@ from grimaldi.scene.polygons import check_obj
 from grimaldi.scene.screen import check_aperture, check_screen
 from grimaldi.scene.serialized import check_serialized
 from grimaldi.scene.sources import ZERO_DIRECTION
-from grimaldi.scene.triangles import LARGEST, check_positions, check_triangles, merged_points
+from grimaldi.scene.triangles import LARGEST, check_positions, check_triangles, merged_points, solid_angle
 
 Reals = NDArray[np.float64]
 
@@ -200,18 +200,6 @@ def _is_inside(point: Reals, body: Body, mi_scene: Any) -> bool:
     low, high = geometry.vertices.min(axis=0), geometry.vertices.max(axis=0)
     if not ((low < point) & (point < high)).all():
         return False
-    winding = _winding_number(point, geometry)
+    winding = solid_angle(geometry.vertices, geometry.faces, point) / (4 * np.pi)
     # 1 in a closed mesh, less where one is open; a room with a missing wall stays well below 0.9.
     return (-winding if faces_inward(mi_scene, body) else winding) > 0.9
-
-
-def _winding_number(point: Reals, mesh: Mesh) -> float:
-    """Solid angle of the faces over 4π (van Oosterom & Strackee 1983, eq. 8)."""
-    a, b, c = np.moveaxis((mesh.vertices - point)[mesh.faces], 1, 0)
-    la, lb, lc = (np.linalg.norm(x, axis=1) for x in (a, b, c))
-
-    def dot(x: Reals, y: Reals) -> Reals:
-        return np.einsum("ij,ij->i", x, y)
-
-    half = np.arctan2(dot(a, np.cross(b, c)), la * lb * lc + dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb)
-    return float(half.sum() / (2 * np.pi))

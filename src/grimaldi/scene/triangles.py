@@ -110,3 +110,12 @@ def areas(
     (ux, uy, uz), (vx, vy, vz) = (b - a).T, (c - a).T
     area = np.stack([uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx], axis=1)
     return area, area / np.maximum(np.linalg.norm(area, axis=1, keepdims=True), 1e-300)
+
+
+def solid_angle(corners: NDArray[np.float64], faces: NDArray[np.integer], point: NDArray[np.float64]) -> float:
+    """Of triangles, seen from a point and signed as they are turned [sr] (van Oosterom & Strackee 1983, eq. 8)."""
+    a, b, c = np.moveaxis((corners - point)[faces], 1, 0)
+    la, lb, lc = (np.linalg.norm(x, axis=1) for x in (a, b, c))
+    volume = np.einsum("ij,ij->i", a, np.cross(b, c))
+    ab, bc, ca = (np.einsum("ij,ij->i", x, y) for x, y in ((a, b), (b, c), (c, a)))
+    return 2 * float(np.arctan2(volume, la * lb * lc + ab * lc + bc * la + ca * lb).sum())
