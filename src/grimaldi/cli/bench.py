@@ -25,9 +25,7 @@ def bench(
             "--output", "-o", help="Put each row, as it is done, into performance.md in this folder.", metavar="DIR"
         ),
     ] = None,
-    data: Annotated[
-        Path | None, typer.Option(help="Folder of the benchmark data.  [default: ../shared, if there]")
-    ] = None,
+    data: options.Data = None,
     peers: Annotated[
         str | None, typer.Option(help="A Python that has LightPipes or diffractio.  [default: this one]")
     ] = None,
@@ -47,20 +45,18 @@ def bench(
     _check_number("--seed", seed, 0, 2**32 - 1)
     if output is not None and not output.is_dir():
         raise InputError(f"{output}: is no folder; make it first")
-    if data is not None and not data.is_dir():
-        raise InputError(f"--data: {data} is no folder; name the one that has scenes/killeroo.xml in it")
+    data = options.benchmark_data(data, "scenes/killeroo.xml")
     if peers is not None and shutil.which(peers) is None:
         raise InputError(f"--peers: {peers} is no program; name a Python that has LightPipes or diffractio")
 
     from grimaldi.bench import report, run
     from grimaldi.bench.model import Settings
-    from grimaldi.figures import benchmark_data
     from grimaldi.files import check_writable
 
     if output is not None:
         check_writable(output / report.PAGE)
     options.set_variant(variant)
-    settings = Settings(seed, runs, data or benchmark_data(), peers, quick)
+    settings = Settings(seed, runs, data, peers, quick)
     for name, row in run(names, settings):
         if output is not None:
             report.write(name, row, settings, output)

@@ -56,6 +56,7 @@ Weights = Annotated[
 Epsilon = Annotated[
     float | None, typer.Option(help="Of the report's silhouette test, in scene units.", metavar="LENGTH")
 ]
+Data = Annotated[Path | None, typer.Option(help="Folder of the benchmark data.  [default: ../shared, if there]")]
 Fast = Annotated[
     bool | None,
     typer.Option(
@@ -107,3 +108,16 @@ def set_variant(name: str | None) -> None:
     except ImportError:
         raise InputError(f"--variant: {name} does not work here; run 'grimaldi doctor' to see why") from None
     ensure_variant("rgb")
+
+
+def benchmark_data(given: Path | None, what: str) -> Path | None:
+    """The folder given, which has `what` in it; else `shared` beside the repository or the current folder, if there."""
+    if given is not None:
+        if not given.is_dir():
+            raise InputError(f"--data: {given} is no folder; name the one that has {what} in it")
+        return given
+    for start in (Path.cwd(), *Path(__file__).resolve().parents[2:4]):
+        folder = start.parent / "shared"
+        if (folder / "scenes").is_dir():
+            return folder
+    return None

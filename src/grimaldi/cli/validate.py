@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from grimaldi.cli import options
 from grimaldi.errors import InputError
 
 
@@ -25,9 +26,7 @@ def validate(
             metavar="DIR",
         ),
     ] = None,
-    data: Annotated[
-        Path | None, typer.Option(help="Folder of the benchmark data.  [default: ../shared, if there]")
-    ] = None,
+    data: options.Data = None,
 ) -> None:
     """Hold the field against every closed form, and print the digits reached.
 
@@ -39,15 +38,13 @@ def validate(
         raise InputError(f"{output}: is no folder; make it first")
     if output is not None:
         check_writable(output / "accuracy.md")
-    if data is not None and not data.is_dir():
-        raise InputError(f"--data: {data} is no folder; name the one that has data/starshade in it")
+    data = options.benchmark_data(data, "data/starshade")
 
-    from grimaldi.figures import benchmark_data
     from grimaldi.validation import STARSHADE, chosen, report, run
     from grimaldi.validation.model import Settings
 
     names = [name.strip() for name in only.split(",")] if only is not None else []
-    settings = Settings(data or benchmark_data())
+    settings = Settings(data)
     checks = chosen(names, settings)
     if not as_json:
         print(report.header([*checks]))

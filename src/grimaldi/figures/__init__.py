@@ -6,7 +6,6 @@ D. Johnston, P. Tarjan, "Ray-tracing Interference and Diffraction", Stanford CS3
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from pathlib import Path
 
 from grimaldi.conventions import did_you_mean
 from grimaldi.errors import InputError
@@ -47,12 +46,3 @@ def draw(settings: Settings, keys: Sequence[str]) -> Iterator[Figure]:
         missing.append("The benchmark data with the killeroo mesh is not at hand; figures 4 and 5 are without it.")
     with replacing(settings.folder / "index.html") as temporary:
         temporary.write_text(page.page(done, missing), encoding="utf-8")
-
-
-def benchmark_data() -> Path | None:
-    """The folder `shared` beside the repository or the current folder, if it is there."""
-    for start in (Path.cwd(), *Path(__file__).resolve().parents[2:4]):
-        folder = start.parent / "shared"
-        if (folder / "scenes").is_dir():
-            return folder
-    return None
