@@ -17,6 +17,10 @@ Reals = NDArray[np.float64]
 Factors = NDArray[np.complex128]
 
 
+def as_complex(values: ArrayLike) -> Factors:
+    return np.asarray(values, np.complex128)
+
+
 @dataclass(frozen=True)
 class Spherical:
     """Eq. 1 with A = 1, φ0 = 0 from `position` (3,)."""
@@ -28,7 +32,7 @@ class Spherical:
         v = x - np.asarray(self.position, float)
         r = np.linalg.norm(v, axis=1)
         u = np.exp(1j * k * r) / r
-        return u, ((1j * k - 1 / r) * u / r)[:, None] * v
+        return as_complex(u), as_complex(((1j * k - 1 / r) * u / r)[:, None] * v)
 
 
 @dataclass(frozen=True)

@@ -161,6 +161,20 @@ def test_it_leaves_alone_what_it_cannot_do_within_the_tolerance(acts):
     assert acts == [False, False]
 
 
+@pytest.mark.parametrize("shape", ["disc", "square"])
+@pytest.mark.parametrize("radius", [2.5e-3, 1e-9])
+def test_a_pinhole(shape, radius):
+    """Far behind holes much smaller than the wavelength, where any rule would serve: |U| is area / (λ z)."""
+    corners = radius * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
+    hole = PlanarOutline.ellipse(np.diag([radius, radius, 1, 1])) if shape == "disc" else PlanarOutline(corners)
+    scene = {"type": "scene", "l": {"type": "coherent_directional", "direction": [0, 0, 1]}}
+    area = (np.pi if shape == "disc" else 4) * radius**2
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", GrimaldiWarning)  # the light is fainter than a tolerance
+        U = grimaldi.field(grimaldi.load(scene, outlines=[hole]), [[0, 0, 1e3]], wavelength=5e-4, tolerance=1e-2).U
+    assert abs(U.values.item()) == pytest.approx(area / 0.5, abs=1e-6)
+
+
 def test_off_means_off(acts):
     scene = grimaldi.load({"type": "scene", "light": lights(FAR, 0)["plane"]}, outlines=holes(1e6)["star"])
     grimaldi.field(scene, grid(1e6, FAR), wavelength=WAVELENGTH, fast=False)

@@ -387,6 +387,7 @@ def test_flat_stays_flat_and_closed_stays_closed():
         ('Shape "trianglemesh" "point P" [0 0 0 1 0 0 0 1 0] "integer indices" [0 1 3]', "face 0 joins vertices 0, 1"),
         ('Shape "trianglemesh" "point P" [0 0 0 1 0 0 0 1 0] "integer indices" [0 1]', "indices has 2 values"),
         ('Shape "trianglemesh" "point P" [0 0 0 1 0]', "P has 5 values; give 3 for each point"),
+        ('Shape "trianglemesh" "integer indices" [0 1.9 2] "point P" [0 0 0 1 0 0 0 1 0]', "not whole numbers"),
         ('Shape "trianglemesh" "integer indices" [0 1 2]', "P is missing"),
         ('Shape "trianglemesh" "point P" [0 0 0 1 0 0 0 1 0] "normal N" [0 0 1]', "1 N for 3 vertices"),
         ('Scale 1 1 0 Shape "trianglemesh" "point P" [0 0 0 1 0 0 0 1 0]', "the transform flattens it"),

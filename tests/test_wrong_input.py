@@ -307,10 +307,20 @@ def test_files_that_hold_no_scene(tmp_path: Path, content, says):
     assert says in refused(tmp_path / "scene.xml")
 
 
-def test_deep_includes(tmp_path: Path):
-    (tmp_path / "deep.xml").write_text("<q>" * 12000 + "</q>" * 12000)
-    (tmp_path / "scene.xml").write_text('<scene version="3.0.0"><include filename="deep.xml"/></scene>')
-    assert "deep.xml, line 1: nested deeper" in refused(tmp_path / "scene.xml")
+@pytest.mark.parametrize(
+    "include",
+    [
+        '<include filename="deep.xml"/>',
+        '<default name="f" value="no"/><default name="file" value="deep"/><include filename="$file.xml"/>',
+        '<path value="there"/><include filename="deeper.xml"/>',
+    ],
+)
+def test_deep_includes(tmp_path: Path, include: str):
+    (tmp_path / "there").mkdir()
+    for name in ("deep.xml", "there/deeper.xml"):
+        (tmp_path / name).write_text("<q>" * 12000 + "</q>" * 12000)
+    (tmp_path / "scene.xml").write_text(f'<scene version="3.0.0">{include}</scene>')
+    assert ".xml, line 1: nested deeper" in refused(tmp_path / "scene.xml")
 
 
 def nested(depth: int) -> dict[str, Any]:

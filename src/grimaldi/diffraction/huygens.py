@@ -97,11 +97,12 @@ def huygens(scene: Scene, source: Source, outline: Outline, k: float, options: O
 def _parts(outline: Outline, k: float, options: Options) -> np.ndarray:
     """How many sources each segment gets: of a partly lit edge its share."""
     length = np.linalg.norm(outline.end - outline.start, axis=1)
-    nyquist = options.n == NYQUIST
-    share = np.ptp(outline.interval, axis=1)
-    parts = np.floor(length * k / np.pi) + 1 if nyquist else np.ceil(share * (options.n or DEFAULT) - 1e-9)
+    if options.n == NYQUIST:
+        parts, advice = np.floor(length * k / np.pi) + 1, "give a number an edge, or a longer wavelength"
+    else:
+        parts = np.ceil(np.ptp(outline.interval, axis=1) * (options.n or DEFAULT) - 1e-9)
+        advice = "give a smaller number an edge"
     if (total := parts.sum()) > MOST:
-        advice = "give a number an edge, or a longer wavelength" if nyquist else "give a smaller number an edge"
         raise InputError(f"n: {options.n!r} makes {total:.3g} sources, more than {MOST:.0e}; {advice}")
     return parts.astype(np.int64)
 

@@ -77,7 +77,7 @@ def count(half: ArrayLike, share: float) -> Integers:
     sigma = np.geomspace(0.01, 5, 200)
     growth = np.sinh(sigma) * np.cosh(sigma) / (2 * sigma)
     n = np.multiply.outer(half, growth) + np.log(8.6 / share / -np.expm1(-2 * sigma)) / (2 * sigma)
-    return np.ceil(n.min(axis=-1)).astype(int) + 1
+    return np.maximum(np.ceil(n.min(axis=-1)).astype(int), 0) + 1
 
 
 @lru_cache(maxsize=64)

@@ -36,4 +36,4 @@ def fields(
 
 def intensity(groups: dict[Hashable, NDArray[np.complex128]]) -> NDArray[np.float64]:
     """Eq. 3 for one wavelength of unit weight: Σ_group |U|², (points,)."""
-    return np.sum([abs(u) ** 2 for u in groups.values()], axis=0)
+    return np.asarray(sum(abs(u) ** 2 for u in groups.values()), np.float64)

@@ -12,10 +12,11 @@ DEEPEST = 200
 
 def check_xml(path: Path) -> None:
     """Raises InputError where `path` or a file it includes cannot be read, is no XML or nests too deep."""
-    _check(path, seen=set())
+    _check(path, set(), {}, [path.parent])
 
 
-def _check(path: Path, seen: set[Path]) -> None:
+def _check(path: Path, seen: set[Path], defaults: dict[str, str], folders: list[Path]) -> None:
+    """The same; what `$name` stands for unless a file says so first, and where includes are looked for."""
     seen.add(path.resolve())
     included: list[str] = []
     depth = 0
@@ -29,6 +30,10 @@ def _check(path: Path, seen: set[Path]) -> None:
             raise InputError(f"{path}, line {line}: nested deeper than {DEEPEST} elements; flatten the scene")
         if name == "include" and "filename" in attributes:
             included.append(attributes["filename"])
+        elif name == "default" and "name" in attributes:
+            defaults.setdefault(attributes["name"], attributes.get("value", ""))
+        elif name == "path" and "value" in attributes:
+            folders.append(path.parent / attributes["value"])
 
     def end(_name: str) -> None:
         nonlocal depth
@@ -46,6 +51,8 @@ def _check(path: Path, seen: set[Path]) -> None:
             f"{path}, line {error.lineno}: malformed XML ({reason}); correct it there, or just before"
         ) from error
     for name in included:
-        file = path.parent / name
-        if file.is_file() and file.resolve() not in seen:  # a missing one Mitsuba names, with its line
-            _check(file, seen)
+        for of in sorted(defaults, key=len, reverse=True):
+            name = name.replace(f"${of}", defaults[of])
+        for file in (folder / name for folder in dict.fromkeys([path.parent, *folders])):
+            if file.is_file() and file.resolve() not in seen:  # a missing one Mitsuba names, with its line
+                _check(file, seen, defaults, folders)

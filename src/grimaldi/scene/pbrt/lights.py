@@ -52,7 +52,7 @@ def _spot(p: Parameters, to_world: Reals) -> dict[str, Any]:
         "to_world": mi.ScalarTransform4f().look_at(eye.tolist(), target.tolist(), aside.tolist()),
         "intensity": emission(scaled(p, "I")),
         "cutoff_angle": cone,
-        "beam_width": cone - p.one("conedeltaangle", 5.0),
+        "beam_width": max(cone - p.one("conedeltaangle", 5.0), 0.0),
     }
 
 

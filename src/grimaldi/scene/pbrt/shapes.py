@@ -99,6 +99,8 @@ class Shape:
         if corners is None and len(points) != 3:
             raise p.place.error(f"{self.kind}: indices are missing; give three for each triangle")
         faces = np.array([[0, 1, 2]]) if corners is None else corners.astype(np.int64)
+        if corners is not None and (faces != corners).any():
+            raise p.place.error(f"{self.kind}: indices are not whole numbers; give three for each triangle")
         check_triangles(points, faces, f"{p.place.path}, line {p.place.line}")
         return points, faces
 

@@ -47,7 +47,7 @@ def tokens(path: Path) -> Iterator[Token]:
     Raises InputError for a file that cannot be read and a text without its closing quote.
     """
     try:
-        content = path.read_text(encoding="utf-8", errors="replace")
+        content = path.read_text(encoding="utf-8-sig", errors="replace")
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror}); check the name") from error
     ends = [match.start() for match in re.finditer("\n", content)]
