@@ -197,6 +197,13 @@ def test_a_closed_mirrored_mesh_is_no_room(write):
     grimaldi.load(write(f"{light} ReverseOrientation {inside}"))
 
 
+def test_a_spot_may_be_narrower_than_its_falloff(write):
+    light = 'LightSource "spot" "point from" [0 0 9] "point to" [0 0 0] "float coneangle" 4'
+    (spot,) = grimaldi.load(write(f"\ufeff{light}")).sources
+    assert spot.spot is not None
+    assert np.degrees([spot.spot.beam_width, spot.spot.cutoff]) == pytest.approx([0, 4])
+
+
 def test_lights(write):
     spot, sun = grimaldi.load(
         write(
