@@ -166,7 +166,7 @@ def test_a_page_keeps_the_rows_of_the_same_machine_that_are_not_measured_anew(tm
 
 def test_runs_take_turns_after_one_untimed():
     order: list[str] = []
-    medians(2, lambda: order.append("a"), lambda: order.append("b"))
+    assert len(medians(2, lambda: order.append("a"), lambda: order.append("b"))) == 2
     assert order == ["a", "b"] * 3
 
 

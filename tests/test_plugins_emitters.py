@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from importlib import import_module
+from pkgutil import iter_modules
 from typing import Any
 
 import mitsuba as mi
 import numpy as np
 import pytest
 
-import grimaldi  # noqa: F401  (registers the plugins)
+import grimaldi.plugins
+from grimaldi.conventions import PLUGINS
 
 POINT = [0.3, 2.0, 3.0]
 DIRECTION = [1.0, 2.0, -3.0]
@@ -126,3 +129,20 @@ def test_parameters_are_kept_in_float64_and_can_be_changed(variant):
 def test_wrong_parameters_are_named(variant, emitter, says):
     with pytest.raises(RuntimeError, match=says):
         mi.load_dict(emitter)
+
+
+def test_plugins_that_messages_suggest_are_those_that_are_registered():
+    """Of which they know the names alone."""
+    names: list[str] = []
+
+    class Variant:
+        """One that registers nothing, but notes its name."""
+
+        def __getattr__(self, name: str) -> Any:
+            if name.startswith("register_"):
+                return lambda plugin, _: names.append(plugin)
+            return getattr(mi.llvm_ad_rgb, name)
+
+    for module in iter_modules(grimaldi.plugins.__path__):
+        getattr(import_module(f"grimaldi.plugins.{module.name}"), "register", lambda _: None)(Variant())
+    assert sorted(names) == sorted(PLUGINS)

@@ -19,6 +19,7 @@ SIGNS = "exp(-i omega t): U = A exp(i phase) exp(+i k R)/R, so phase grows with 
 
 Wavelength = float | str | Sequence[float | str]
 ModelName = Literal["none", "boundary", "huygens", "area"]
+LONGEST_PATH = (1 << 31) - 1  # segments
 PLUGINS = (  # what `grimaldi.plugins` adds to Mitsuba's
     "aperture",
     "coherent_area",

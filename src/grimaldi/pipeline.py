@@ -181,4 +181,4 @@ def real(values: Any, name: str) -> NDArray[np.float64]:
             return np.asarray(array, dtype=np.float64)
     except (TypeError, ValueError, OverflowError):
         pass
-    raise InputError(f"{name}: not real numbers, or not all; give an array of shape (n, 3)") from None
+    raise InputError(f"{name}: not real numbers, or not all; give an array of shape (n, 3)")

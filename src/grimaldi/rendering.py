@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from grimaldi.conventions import check_options, whole
+from grimaldi.conventions import LONGEST_PATH, check_options, whole
 from grimaldi.errors import GrimaldiWarning, InputError
 from grimaldi.film.layers import Layers
 from grimaldi.one_at_a_time import one_at_a_time
@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from grimaldi.scene.model import Scene
 
 SAMPLES = 1 << 20  # a pixel, at most
-DEEPEST = (1 << 31) - 1  # segments of a path
 
 
 @one_at_a_time
@@ -201,7 +200,7 @@ def shot_of(sensor: Any, own: Any, spp: int | None, seed: int, max_depth: int | 
     depth = max_depth if max_depth is not None else (own.max_depth if own is not None else 2)
     samples = _whole("spp", count, 1, SAMPLES, f"number of samples; give 1 to {SAMPLES}, such as 16")
     seed = _whole("seed", seed, 0, (1 << 32) - 1, "seed; give an integer from 0 to 2^32 - 1")
-    depth = _whole("max_depth", depth, -1, DEEPEST, "path length; give 2 for direct light, -1 for no limit")
+    depth = _whole("max_depth", depth, -1, LONGEST_PATH, "path length; give 2 for direct light, -1 for no limit")
     rr_depth, hidden = (own.rr_depth, own.hidden) if own is not None else (5, False)
     return Shot(width, height, samples, seed, depth, rr_depth, hidden)
 

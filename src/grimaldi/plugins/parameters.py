@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from grimaldi.conventions import LONGEST_PATH
 from grimaldi.errors import InputError
 
 
@@ -54,6 +55,6 @@ def names(props: Any, name: str) -> tuple[str, ...]:
 def depth(props: Any, name: str, default: int, *, least: int) -> int:
     """A path length, or -1 for no limit."""
     value = props.get(name, default)
-    if isinstance(value, bool) or not isinstance(value, int) or value >= 1 << 31 or (value < least and value != -1):
+    if isinstance(value, bool) or not isinstance(value, int) or value > LONGEST_PATH or (value < least and value != -1):
         raise InputError(f"{props.plugin_name()}: {name} is {value!r}; give {least} or more, or -1 for no limit")
     return value
